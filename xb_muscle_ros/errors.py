@@ -1,0 +1,46 @@
+"""The errors a user sees: one line that names the thing, the value, what is allowed and the remedy."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class UserError(Exception):
+    """Something the user can mend; the command line prints it on one line and exits with code 2.
+
+    The message names the file, fibre, parameter, state or time at fault, the value found, what is allowed, and
+    what to do. Line breaks are folded away, because logs and terminals are read line by line.
+    """
+
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(message.split()))
+
+
+class StateViolation(UserError):
+    """The integration left the states a fibre can have.
+
+    Attributes:
+        fibre: name of the fibre.
+        state: name of the state that was violated, for example ``n_on``.
+        time_s: time of the violation in s.
+        value: the value the state took.
+    """
+
+    def __init__(self, fibre: str, state: str, time_s: float, value: float, allowed: str, remedy: str) -> None:
+        super().__init__(
+            f"fibre {fibre}: state {state} became {value:.6g} at t = {time_s:.6g} s; allowed is {allowed}; {remedy}"
+        )
+        self.fibre = fibre
+        self.state = state
+        self.time_s = time_s
+        self.value = value
+
+
+def suggest(word: str, known: Iterable[str]) -> str:
+    """Return ``; did you mean 'x'?`` for the nearest of the known names, or the list of them."""
+    names = sorted(known)
+    near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
+    if near:
+        return f"; did you mean '{near[0]}'?"
+    return f"; known: {', '.join(names)}"

@@ -1,0 +1,103 @@
+"""A trial: what was done to one fibre and what it answered; read-only data in SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A named stretch of time within a trial.
+
+    Attributes:
+        name: ``isometric``, ``conditioning_stretch``, ``shortening``, ``recovery``, ``test_stretch`` or ``hold``;
+            triangles that are not the paper's protocol use ``stretch`` and ``shortening``.
+        start_s: begin, in the trial's own time, s.
+        end_s: end, s; not before ``start_s``.
+    """
+
+    name: str
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class TrialFacts:
+    """What is known of a trial beside its samples; kept in a bag's ``custom_data``.
+
+    Attributes:
+        fibre: name of the fibre.
+        trial: name of the trial, unique within its data set.
+        pca: -log10 of the free calcium in M; None where calcium changes.
+        amplitude_l0: amplitude of the conditioning stretch in L0; None where there is none to speak of.
+        recovery_s: time between shortening and test stretch, s; None where there is no test stretch.
+        reference_length_m: the length that is one L0 (rest), m.
+        f0_n: the isometric force at pCa 4.5 that is one F0, N.
+        phases: in order of time.
+        source: where the data come from, in words.
+    """
+
+    fibre: str
+    trial: str
+    pca: float | None = None
+    amplitude_l0: float | None = None
+    recovery_s: float | None = None
+    reference_length_m: float = 1.0
+    f0_n: float = 1.0
+    phases: tuple[Phase, ...] = ()
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Samples and facts of one trial; arrays are read-only.
+
+    Attributes:
+        facts: see `TrialFacts`.
+        time_s: shape (n,), strictly increasing, s; the trial's own time.
+        length_m: shape (n,), fibre length, m.
+        calcium_time_s: shape (m,), strictly increasing, s; a value holds until the next one.
+        calcium_um: shape (m,), free calcium, µM.
+        force_time_s: shape (k,), strictly increasing, s; empty where force was not measured.
+        force_n: shape (k,), measured force, N.
+        warnings: what was wrong with the source but could be lived with (a recovered file, say), one line each.
+    """
+
+    facts: TrialFacts
+    time_s: Array
+    length_m: Array
+    calcium_time_s: Array
+    calcium_um: Array
+    force_time_s: Array = field(default_factory=lambda: np.empty(0))
+    force_n: Array = field(default_factory=lambda: np.empty(0))
+    warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("time_s", "length_m", "calcium_time_s", "calcium_um", "force_time_s", "force_n"):
+            array = np.ascontiguousarray(getattr(self, name), dtype=np.float64).copy()
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def length_change_l0(self) -> Array:
+        """Fibre length change relative to rest, L0, shape (n,)."""
+        return self.length_m / self.facts.reference_length_m - 1.0
+
+    @property
+    def measured_f0(self) -> Array:
+        """Measured force in F0, shape (k,)."""
+        return self.force_n / self.facts.f0_n
+
+    def phases_by_name(self) -> Mapping[str, Phase]:
+        """The first phase of each name."""
+        found: dict[str, Phase] = {}
+        for phase in self.facts.phases:
+            found.setdefault(phase.name, phase)
+        return MappingProxyType(found)
