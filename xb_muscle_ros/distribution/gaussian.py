@@ -1,0 +1,38 @@
+"""Gaussian form: the heads' strain is normally distributed, three moments tell all (Zahalak 1981)."""
+
+from __future__ import annotations
+
+from xb_muscle_ros.distribution.base import MomentRepresentation, Moments
+from xb_muscle_ros.mechanisms import ops
+from xb_muscle_ros.mechanisms.base import ExponentialRate, Quantities, State, StrainRate
+from xb_muscle_ros.mechanisms.ops import Expr
+
+# Moments in power strokes: at 40 the fibre's end would have moved by 30 % L0 with the heads still attached.
+_FAR = 40.0
+
+
+class Gaussian(MomentRepresentation):
+    """Q0 times a normal density with mean p = Q1/Q0 and variance q = Q2/Q0 - p²."""
+
+    name = "gaussian"
+    states = (
+        State("q0", "1", "fraction of heads attached", 0.0, 1.0),
+        State("q1", "power strokes", "first moment of the attached heads over strain", -_FAR, _FAR),
+        State("q2", "power strokes²", "second moment of the attached heads over strain", 0.0, _FAR**2),
+    )
+
+    def mean_and_variance(self, q: Quantities) -> tuple[Expr, Expr]:
+        """p and q of the heads' strain."""
+        heads = q.divisor(q.q0)
+        mean = q.q1 / heads
+        return mean, q.variance(q.q2 / heads - mean**2)
+
+    def outflow(self, q: Quantities, rate: StrainRate) -> Moments:
+        """Closed forms: an exponential tilts the normal density, a step truncates it."""
+        mean, variance = self.mean_and_variance(q)
+        if isinstance(rate, ExponentialRate):
+            exponent = rate.slope * mean + rate.slope**2 * variance / 2
+            flux = q.q0 * rate.scale * ops.exp(q.limit(exponent))
+            shifted = mean + rate.slope * variance
+            return Moments(flux, flux * shifted, flux * (shifted**2 + variance))
+        raise TypeError(f"the Gaussian form has no moments for a rate of type {type(rate).__name__}")

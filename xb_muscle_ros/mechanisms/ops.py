@@ -1,0 +1,92 @@
+"""Functions that a mechanism's formulas may use beside + - * / and **.
+
+Every function takes floats or the symbols that the composition hands to a mechanism. With floats it computes, so that
+a formula can be tried and tested as plain Python; with symbols it builds the expression that is differentiated and
+compiled. SymPy is imported on the first symbol only: a node with compiled models never loads it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+# A symbol, an expression or a float. SymPy has no types, and formulas must not care which of them they hold.
+Expr = Any
+
+
+def _numeric(*values: Expr) -> bool:
+    return all(isinstance(value, (int, float)) for value in values)
+
+
+def exp(z: Expr) -> Expr:
+    """e to the power z."""
+    if _numeric(z):
+        return math.exp(z)
+    import sympy
+
+    return sympy.exp(z)
+
+
+def log(z: Expr) -> Expr:
+    """Natural logarithm."""
+    if _numeric(z):
+        return math.log(z)
+    import sympy
+
+    return sympy.log(z)
+
+
+def sqrt(z: Expr) -> Expr:
+    """Square root."""
+    if _numeric(z):
+        return math.sqrt(z)
+    import sympy
+
+    return sympy.sqrt(z)
+
+
+def tanh(z: Expr) -> Expr:
+    """Hyperbolic tangent."""
+    if _numeric(z):
+        return math.tanh(z)
+    import sympy
+
+    return sympy.tanh(z)
+
+
+def erf(z: Expr) -> Expr:
+    """Error function."""
+    if _numeric(z):
+        return math.erf(z)
+    import sympy
+
+    return sympy.erf(z)
+
+
+def softplus(z: Expr, sharpness: Expr) -> Expr:
+    """Smooth positive part ln(1 + exp(sharpness z))/sharpness, in the unit of z."""
+    if _numeric(z, sharpness):
+        return max(z, 0.0) + math.log1p(math.exp(-abs(sharpness * z))) / sharpness
+    from xb_muscle_ros.models.symbols import Softplus
+
+    return Softplus(z, sharpness)
+
+
+def positive(z: Expr) -> Expr:
+    """Positive part of z, 0 below 0."""
+    if _numeric(z):
+        return max(z, 0.0)
+    from xb_muscle_ros.models.symbols import Positive
+
+    return Positive(z)
+
+
+def smooth_series_extension(force: Expr, kse0: Expr, sharpness: Expr) -> Expr:
+    """Integral of dF/(softplus(F, sharpness) + kse0) from 0 to force: extension times kse of the smoothed spring."""
+    if _numeric(force, kse0, sharpness):
+        from xb_muscle_ros.models.intrinsics import smooth_series_extension as compute
+
+        return float(compute(force, kse0, sharpness))
+    from xb_muscle_ros.models.symbols import SmoothSeriesExtension
+
+    return SmoothSeriesExtension(force, kse0, sharpness)

@@ -1,0 +1,48 @@
+"""Exponential series spring."""
+
+from __future__ import annotations
+
+from xb_muscle_ros.mechanisms import ops
+from xb_muscle_ros.mechanisms.base import Parameter, Quantities, Series
+from xb_muscle_ros.mechanisms.ops import Expr
+
+KSE = Parameter("kse", "1/power stroke", "exponent of the series spring", 1e-4, 100.0, None, "van der Zee et al. 2026")
+KSE0 = Parameter("kse0", "1", "force scale of the series spring (cross-bridge force)", 1e-6, 1e3, None, "van der Zee et al. 2026")
+
+
+SMOOTH_STIFFNESS = Parameter(
+    "smooth_stiffness",
+    "1",
+    "1 where the released set also smoothed the heads' stiffness in the velocity constraint (v3), 0 where not",
+    0.0,
+    1.0,
+    0.0,
+    "as released",
+)
+
+
+class ExponentialSeries(Series):
+    """F_xb = kse0 (exp(kse l_se) - 1), with the tangent k_se = kse (F_xb + kse0).
+
+    The velocity follows from the differentiated force balance; the series element's length is computed from the force
+    that the heads bear, so that both elements always bear the same force and no drift can build up between them.
+    Below zero force the spring goes on with its tangent at rest, as in the released sets.
+    """
+
+    name = "exponential"
+    parameters = (KSE, KSE0, SMOOTH_STIFFNESS)
+
+    def ce_velocity(self, q: Quantities) -> Expr:
+        """U = (gamma v k_se - dF_kin)/(dF/dx + k_se)."""
+        stiffness = q.kse * (q.positive(q.force_xb) + q.kse0)
+        heads = q.stiffness_xb
+        if q.smooth:
+            heads = heads + q.smooth_stiffness * (q.positive(heads) - heads)
+        return (q.gamma * q.velocity * stiffness - q.kinetic_force_rate) / (heads + stiffness)
+
+    def extension(self, q: Quantities) -> Expr:
+        """Integral of dF/k_se from 0 to the present force."""
+        if q.smooth:
+            return ops.smooth_series_extension(q.force_xb, q.kse0, q.smoothing) / q.kse
+        taut = ops.positive(q.force_xb)
+        return ops.log(1 + taut / q.kse0) / q.kse + (q.force_xb - taut) / (q.kse * q.kse0)

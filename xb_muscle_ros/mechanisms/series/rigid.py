@@ -1,0 +1,20 @@
+"""No series compliance: the contractile element takes the whole length change."""
+
+from __future__ import annotations
+
+from xb_muscle_ros.mechanisms.base import Quantities, Series
+from xb_muscle_ros.mechanisms.ops import Expr
+
+
+class RigidSeries(Series):
+    """The family's null block: u = gamma v."""
+
+    name = "rigid"
+
+    def ce_velocity(self, q: Quantities) -> Expr:
+        """See the class."""
+        return q.gamma * q.velocity
+
+    def extension(self, q: Quantities) -> Expr:
+        """None at any force."""
+        return 0.0

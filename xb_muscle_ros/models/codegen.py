@@ -1,0 +1,225 @@
+"""From equations to the text of a Python module that Numba compiles: one flat right-hand side, one flat step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import sympy
+
+from xb_muscle_ros.models.composition import INPUTS, OUTPUTS, Composition, Equations, equations
+from xb_muscle_ros.models.elimination import Elimination
+from xb_muscle_ros.models.program import Program, c, jacobian, program, python
+from xb_muscle_ros.stepping import rodas3
+
+_HEADER = '''"""Generated from the mechanisms of model {name}{smooth}; do not edit."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from xb_muscle_ros.models.intrinsics import (
+    hyperbolic_tangent,
+    logistic,
+    positive_part,
+    smooth_series_extension,
+    softplus,
+    unit_step,
+)
+'''
+_JIT = '@njit(cache=True, error_model="numpy")'
+
+
+def module_text(model: Composition, smooth: bool) -> str:
+    """Text of the module that steps a model.
+
+    Args:
+        model: the composition.
+        smooth: with the released sets' smooth functions, or exact.
+    """
+    e = equations(model, smooth)
+    n = len(e.states)
+    header = _HEADER.format(name=model.name, smooth=" with smooth functions" if smooth else "")
+    sizes = (
+        f"N_STATES, N_VECTOR = {n}, {n + len(INPUTS)}\nLENGTH, VELOCITY, CALCIUM = {n}, {n + 1}, {n + 2}\n"
+        "OK, NOT_FINITE, OUT_OF_BOUNDS, TOO_MANY_STEPS = 0, 1, 2, 3\nMAX_ATTEMPTS = 20000\n"
+        f"STATES = {tuple(s.name for s in e.states)!r}\nOUTPUTS = {OUTPUTS!r}\n"
+    )
+    parts = [header, sizes, _rhs(e), _attempt(e), _slope(e), _vector("rest", e, e.rest), _outputs(e)]
+    parts.append(_violation(e, smooth))
+    return "\n\n".join(parts) + "\n\n\n" + _kernels() + "\n"
+
+
+def c_text(model: Composition, smooth: bool) -> str:
+    """The same right-hand side in C, for comparison: `void rhs(const double *z, double velocity, ...)`."""
+    from xb_muscle_ros.models.intrinsics import C_SOURCE
+
+    e = equations(model, smooth)
+    lines = _scalars(e, "z", c_style=True)
+    body = program(e.derivatives[:-1], "t")
+    lines += [f"double {s} = {c(x)};" for s, x in body.lines]
+    lines += [f"out[{i}] = {c(r)};" for i, r in enumerate(body.results)]
+    text = "\n    ".join(lines)
+    head = "void rhs(const double *restrict z, double velocity, double calcium, const double *restrict p,"
+    return f"#include <math.h>\n{C_SOURCE}\n{head} double *restrict out) {{\n    {text}\n}}\n"
+
+
+def _scalars(e: Equations, source: str, c_style: bool = False) -> list[str]:
+    """Lines that load parameters and states from arrays, and the shift behind the states."""
+    kind, end = ("double ", ";") if c_style else ("", "")
+    lines = [f"{kind}{p.name} = p[{i}]{end}" for i, p in enumerate(e.parameters)]
+    lines += [f"{kind}{s.name} = {source}[{i}]{end}" for i, s in enumerate(e.states)]
+    return [*lines, f"{kind}shift = {source}[{len(e.states)}]{end}"]
+
+
+def _function(head: str, doc: str, lines: Iterable[str]) -> str:
+    body = "\n".join(f"    {line}" for line in lines)
+    return f'{_JIT}\ndef {head}:\n    """{doc}"""\n{body}\n'
+
+
+def _assignments(body: Program) -> list[str]:
+    return [f"{symbol} = {python(expression)}" for symbol, expression in body.lines]
+
+
+def _parameters(e: Equations, used: Iterable[Any]) -> list[str]:
+    names = {str(s) for s in used}
+    return [f"{p.name} = p[{i}]" for i, p in enumerate(e.parameters) if p.name in names]
+
+
+def _used(*programs: Program) -> set[Any]:
+    found: set[Any] = set()
+    for body in programs:
+        for _, expression in body.lines:
+            found |= expression.free_symbols
+        for result in body.results:
+            found |= result.free_symbols
+    return found
+
+
+def _rhs(e: Equations) -> str:
+    """Rates of change in the fixed frame, scalars in and a tuple out: nothing touches memory."""
+    body = program(e.derivatives[:-1], "t")
+    names = ", ".join([*(s.name for s in e.states), "shift"])
+    lines = [*_parameters(e, _used(body)), *_assignments(body)]
+    lines.append(f"return ({', '.join(python(r) for r in body.results)},)")
+    text = _function(f"rates({names}, velocity, calcium, p)", "Rates of the states and of the shift.", lines)
+    loads = [f"z[{i}]" for i in range(len(e.states) + 1)]
+    call = [f"r = rates({', '.join(loads)}, velocity, calcium, p)"]
+    call += [f"out[{i}] = r[{i}]" for i in range(len(e.states) + 1)]
+    return text + "\n\n" + _function("rhs(z, velocity, calcium, p, out)", "The same on arrays; z ends in shift.", call)
+
+
+def _attempt(e: Equations) -> str:
+    """One Rosenbrock step, written out."""
+    names = [*(s.name for s in e.states), "shift"]
+    variables = [*(e.symbols[s.name] for s in e.states), e.shift]
+    n = len(names)
+    both, rows = jacobian(program(e.derivatives[:-1], "t"), variables, "d")
+    # The frame is fixed at the start of the step, so the Jacobian is wanted where the shift is zero.
+    flat = Program(both.lines, [*both.results, *(x for row in rows for x in row)])
+    flat = flat.substituted({e.shift: sympy.Integer(0)}).needed()
+    first, entries = flat.results[:n], flat.results[n:]
+    solver = Elimination([[entries[i * n + j] != 0 for j in range(n)] for i in range(n)])
+    lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
+    lines += [*_parameters(e, _used(flat)), *_assignments(flat)]
+    lines += [f"per_h = 1.0 / h", f"diagonal = per_h * {1.0 / rodas3.GAMMA!r}"]
+    for i, j in solver.entries():
+        entry = entries[i * n + j]
+        value = "" if entry == 0 else f" - ({python(entry)})"
+        lines.append(f"a_{i}_{j} = {'diagonal' if i == j else '0.0'}{value}")
+    lines += solver.factor("a")
+    for stage in range(4):
+        k = f"k{stage}"
+        point = [_sum([names[i] if i < n - 1 else "0.0"], rodas3.A[stage], i) for i in range(n)]
+        if stage == 0:
+            values = [python(r) for r in first]
+        elif all(x == 0.0 for x in rodas3.A[stage]):
+            values = [f"f0_{i}" for i in range(n)]
+        else:
+            lines.append(f"f{stage} = rates({', '.join(point)}, velocity, calcium, p)")
+            values = [f"f{stage}[{i}]" for i in range(n)]
+        if stage == 0:
+            lines += [f"f0_{i} = {v}" for i, v in enumerate(values)]
+            values = [f"f0_{i}" for i in range(n)]
+        for i in range(n):
+            memory = _sum([], rodas3.C[stage], i)
+            lines.append(f"{k}_{i} = {values[i]}" + (f" + per_h * ({memory})" if memory else ""))
+        lines += solver.solve("a", k)
+    lines += [f"e_{i} = {_sum([], rodas3.E, i)}" for i in range(n)]
+    lines += [f"y_{i} = {_sum([names[i] if i < n - 1 else '0.0'], rodas3.M, i)}" for i in range(n)]
+    swap = {symbol: sympy.Symbol(f"y_{i}", real=True) for i, symbol in enumerate(variables)}
+    arrival = program([x.subs(swap, simultaneous=True) for x in e.arrival], "m")
+    lines += _assignments(arrival)
+    lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(arrival.results)]
+    # Relative for large moments, absolute otherwise: forces and fractions are of order one.
+    lines += ["error = 0.0"]
+    for i in range(n):
+        lines.append(f"error = max(error, abs(e_{i}) / (1.0 + abs(y_{i})))")
+    lines += ["return error if error == error else math.inf"]
+    doc = "One Rosenbrock step of h seconds; returns the largest embedded error."
+    return _function("attempt(s, h, velocity, calcium, p, out)", doc, lines)
+
+
+def _sum(start: list[str], weights: Iterable[float], i: int) -> str:
+    """Terms ``w_j k_j_i`` behind some others."""
+    terms = list(start) if start != ["0.0"] else []
+    for j, w in enumerate(weights):
+        if w == 1.0:
+            terms.append(f"k{j}_{i}")
+        elif w != 0.0:
+            terms.append(f"{w!r} * k{j}_{i}")
+    return " + ".join(terms) if terms or not start else "0.0"
+
+
+def _slope(e: Equations) -> str:
+    """Rates in the moving frame, for interpolation: dx/dt = d arrival/d(state, shift) . rates, at zero shift."""
+    variables = [*(e.symbols[s.name] for s in e.states), e.shift]
+    rates = e.derivatives[:-1]
+    moving = []
+    for x in e.arrival:
+        total = sum(sympy.diff(x, v) * r for v, r in zip(variables, rates, strict=True))
+        moving.append(sympy.sympify(total).subs(e.shift, 0))
+    body = program(moving, "t")
+    lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
+    lines += [*_parameters(e, _used(body)), *_assignments(body)]
+    lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
+    return _function("slope(s, velocity, calcium, p, out)", "Rates of change of the integrated states.", lines)
+
+
+def _outputs(e: Equations) -> str:
+    body = program(e.outputs, "t")
+    n = len(e.states)
+    lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
+    lines += [f"{s.name} = s[{n + i}]" for i, s in enumerate(INPUTS)]
+    lines += [*_parameters(e, _used(body)), *_assignments(body)]
+    lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
+    return _function("outputs(s, p, out)", "Forces, contractile element and states, as named in OUTPUTS.", lines)
+
+
+def _vector(name: str, e: Equations, expressions: Iterable[Any]) -> str:
+    body = program(list(expressions), "t")
+    lines = [*_parameters(e, _used(body)), *_assignments(body)]
+    lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
+    return _function(f"{name}(p, out)", "State of a fibre at rest without calcium.", lines)
+
+
+def _violation(e: Equations, smooth: bool) -> str:
+    """Bounds of the states. The smooth functions blur moments by 1/K: their equations leave the exact bounds by that."""
+    index = [p.name for p in e.parameters].index("smoothing")
+    lines = [f"slack = slack + 1.0 / p[{index}]"] if smooth else []
+    for i, s in enumerate(e.states):
+        # Written so that a NaN fails the comparison.
+        lines += [f"if not ({s.lower!r} - slack <= s[{i}] <= {s.upper!r} + slack):", f"    return {i}"]
+    doc = "First state out of bounds by more than slack, else -1."
+    return _function("violation(s, p, slack)", doc, [*lines, "return -1"])
+
+
+def _kernels() -> str:
+    """The loops of `stepping.kernels`, decorated."""
+    from xb_muscle_ros.stepping import kernels
+
+    text = Path(kernels.__file__).read_text(encoding="utf-8").split("# BEGIN COMPILED\n", 1)[1]
+    text = text.replace(": Array", "").replace(" -> Any", "").replace(" -> None", "").replace(": float", "").replace(": int", "")
+    return text.replace("\ndef ", f"\n{_JIT}\ndef ").replace("def advance", f"{_JIT}\ndef advance", 1)

@@ -1,0 +1,89 @@
+"""Compiled models on disk: generated once, compiled once, loaded in milliseconds afterwards.
+
+The folder is `XB_MUSCLE_CACHE`, else `xb_muscle_ros` in the user's cache folder, else one in the temporary folder. A
+file's name carries a hash of everything that it depends on, so that a changed mechanism never meets a stale file.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import importlib.util
+import os
+import sys
+import tempfile
+from pathlib import Path
+from types import ModuleType
+
+import numba
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.registry import compose
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+_SOURCES = ("mechanisms", "distribution", "models", "stepping")
+
+
+@functools.lru_cache(maxsize=1)
+def _fingerprint() -> str:
+    """Hash of all source that generated code depends on, and of what compiles it."""
+    digest = hashlib.sha256(f"{sys.version} numba {numba.__version__}".encode())
+    for folder in _SOURCES:
+        for file in sorted((_PACKAGE / folder).rglob("*.py")):
+            digest.update(str(file.relative_to(_PACKAGE)).encode())
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Folder for generated code; made if need be.
+
+    Raises:
+        UserError: no folder can be written.
+    """
+    named = os.environ.get("XB_MUSCLE_CACHE")
+    choices = [Path(named)] if named else []
+    if not named:
+        home = os.environ.get("XDG_CACHE_HOME") or str(Path("~/.cache").expanduser())
+        choices = [Path(home) / "xb_muscle_ros", Path(tempfile.gettempdir()) / f"xb_muscle_ros_{os.getuid()}"]
+    for folder in choices:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            continue
+        if os.access(folder, os.W_OK):
+            return folder
+    tried = ", ".join(str(folder) for folder in choices)
+    raise UserError(f"no folder for compiled models can be written (tried {tried}); set XB_MUSCLE_CACHE to one that can")
+
+
+@functools.lru_cache(maxsize=None)
+def compiled(model: str, method: str, smooth: bool) -> ModuleType:
+    """The compiled module of a model: `advance`, `run`, `follow`, `outputs`, `rest`, `rhs` and its sizes.
+
+    Args:
+        model: registry name.
+        method: representation of the distribution.
+        smooth: with the released sets' smooth functions.
+
+    Raises:
+        UserError: unknown names, or no folder to write to.
+    """
+    composition = compose(model, method)
+    stem = f"m_{composition.name}_{'smooth' if smooth else 'exact'}_{_fingerprint()}"
+    path = cache_folder() / f"{stem}.py"
+    if not path.exists():
+        from xb_muscle_ros.models.codegen import module_text
+
+        # Under a name of its own first: another process may be at the same file.
+        with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".tmp", delete=False, encoding="utf-8") as file:
+            file.write(module_text(composition, smooth))
+        Path(file.name).replace(path)
+    spec = importlib.util.spec_from_file_location(f"xb_muscle_ros_generated_{stem}", path)
+    if spec is None or spec.loader is None:
+        raise UserError(f"compiled model {path} cannot be loaded; remove it and try again")
+    module = importlib.util.module_from_spec(spec)
+    # Numba's cache looks the module up by name when it loads compiled code.
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module

@@ -1,0 +1,208 @@
+"""A model as a row of blocks, and the one set of equations that they make together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from xb_muscle_ros.distribution.base import ZERO, MomentRepresentation, Moments
+from xb_muscle_ros.mechanisms.base import (
+    Attachment,
+    Detachment,
+    Mechanism,
+    Parallel,
+    Parameter,
+    Quantities,
+    Series,
+    State,
+    ThickFilament,
+    ThinFilament,
+)
+from xb_muscle_ros.mechanisms.ops import Expr
+
+GAMMA = Parameter(
+    "gamma", "power strokes/L0", "half-sarcomere length in power strokes (1.3 µm / 10 nm)", 1.0, 1e4, 130.0,
+    "van der Zee et al. 2026",
+)  # fmt: skip
+FSCALE = Parameter(
+    "Fscale", "F0", "fibre force per cross-bridge force: 1 / attached fraction at pCa 4.5", 1e-3, 1e3, 2.0,
+    "van der Zee et al. 2026",
+)  # fmt: skip
+SMOOTHING = Parameter(
+    "smoothing", "1", "sharpness K of the smooth functions the released sets were fitted with; 0 is exact", 0.0, 1e6,
+    0.0, "as released (K = 100)",
+)  # fmt: skip
+COMMON = (GAMMA, FSCALE, SMOOTHING)
+
+# Inputs are carried at the end of the state vector, so that a state tells all that the next step needs.
+INPUTS = (
+    State("length_change", "L0", "fibre length change relative to rest", -1.0, 10.0),
+    State("velocity", "L0/s", "fibre velocity of the last step", -1e9, 1e9),
+    State("calcium", "µM", "free calcium of the last step", 0.0, 1e6),
+)
+OUTPUTS = (
+    "force_f0", "force_ce_f0", "force_pe_f0", "ce_length_change_l0", "ce_velocity_l0_per_s",
+    "q0", "q1", "q2", "n_on", "drx", "r",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Composition:
+    """One block of each family and a representation of the strain distribution."""
+
+    name: str
+    thin_filament: ThinFilament
+    thick_filament: ThickFilament
+    attachment: Attachment
+    detachment: Detachment
+    series: Series
+    parallel: Parallel
+    representation: MomentRepresentation
+
+    @property
+    def blocks(self) -> tuple[Mechanism, ...]:
+        """All blocks, in the order in which their states stand."""
+        return (
+            self.thin_filament,
+            self.thick_filament,
+            self.attachment,
+            self.detachment,
+            self.series,
+            self.parallel,
+        )
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Rows of the parameter table that this model needs, without repeats."""
+        rows: dict[str, Parameter] = {}
+        for row in (*(p for block in self.blocks for p in block.parameters), *COMMON):
+            rows.setdefault(row.name, row)
+        return tuple(rows.values())
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """States that are integrated, moments first, without the inputs."""
+        return (*self.representation.states, *(s for block in self.blocks for s in block.states))
+
+
+@dataclass(frozen=True)
+class Equations:
+    """A model written out in symbols.
+
+    Attributes:
+        states: integrated states, in the strain frame of the contractile element's present position.
+        parameters: in the order of the parameter vector.
+        symbols: the SymPy symbol of every state, input and parameter, by name.
+        shift: the symbol of the contractile element's movement within a step, power strokes.
+        derivatives: rates of the states in the frame that was fixed at the start of the step, then that of the
+            shift, then that of the length change. In the fixed frame the movement of the heads with the contractile
+            element is exact: only attachment and detachment change the moments.
+        arrival: the states in the frame of the end of the step, from those in the fixed frame and the shift.
+        rest: states of a fibre at rest without calcium.
+        outputs: values of `OUTPUTS`, at zero shift.
+    """
+
+    states: tuple[State, ...]
+    parameters: tuple[Parameter, ...]
+    symbols: Mapping[str, Any]
+    shift: Any
+    derivatives: tuple[Expr, ...]
+    arrival: tuple[Expr, ...]
+    rest: tuple[Expr, ...]
+    outputs: tuple[Expr, ...]
+
+
+def equations(model: Composition, smooth: bool) -> Equations:
+    """Write a composition out; `smooth` picks the released sets' smooth functions.
+
+    Raises:
+        AttributeError: a block asks for a quantity that no block provides; the message names both.
+    """
+    import sympy
+
+    names = [*(s.name for s in model.states), *(i.name for i in INPUTS), *(p.name for p in model.parameters)]
+    symbols = {name: sympy.Symbol(name, real=True) for name in names}
+    shift = sympy.Symbol("shift", real=True)
+    fixed = Moments(symbols["q0"], symbols["q1"], symbols["q2"])
+    moved = _moved(fixed, shift)
+    values = {**symbols, "q0": moved.m0, "q1": moved.m1, "q2": moved.m2}
+    kinetics, others, q = _rates(model, Quantities(values, "composition", symbols["smoothing"] if smooth else None))
+    # In the frame fixed at the start of the step a head's strain is x - shift, whatever the velocity.
+    in_fixed = _moved(kinetics, -shift)
+    derivatives = [*in_fixed, *(others[s.name] for s in model.states[3:]), q.ce_velocity, symbols["velocity"]]
+    rest_q = Quantities(symbols, "composition", None)
+    rest = [0, 0, 0]
+    for block in model.blocks:
+        rest += [block.rest(rest_q.for_block(block.name))[s.name] for s in block.states]
+    return Equations(
+        states=model.states,
+        parameters=model.parameters,
+        symbols=symbols,
+        shift=shift,
+        derivatives=tuple(sympy.sympify(e) for e in derivatives),
+        arrival=tuple(sympy.sympify(e) for e in (*moved, *(symbols[s.name] for s in model.states[3:]))),
+        rest=tuple(sympy.sympify(e) for e in rest),
+        outputs=tuple(sympy.sympify(e).subs(shift, 0) for e in _outputs(model, q)),
+    )
+
+
+def _moved(m: Moments, shift: Expr) -> Moments:
+    """Moments about a point that lies `shift` lower: every strain has grown by `shift`."""
+    return Moments(m.m0, m.m1 + shift * m.m0, m.m2 + 2 * shift * m.m1 + shift**2 * m.m0)
+
+
+def _rates(model: Composition, q: Quantities) -> tuple[Moments, dict[str, Expr], Quantities]:
+    """Kinetics of the moments at constant strain, rates of the other states, and all quantities on the way.
+
+    The order is fixed by who needs what: force and sites before heads, heads before fluxes, fluxes before velocity.
+    """
+    import sympy
+
+    thin, thick, detach = model.thin_filament, model.thick_filament, model.detachment
+    q = q.for_block(model.detachment.name, force_xb=q.q0 + q.q1)
+    q = q.for_block(thin.name, forcibly_detached=detach.forcibly_detached(q))
+    q = q.for_block(thick.name, available_sites=thin.available_sites(q))
+    q = q.for_block(model.attachment.name, ready_heads=thick.ready_heads(q))
+    represent = model.representation
+    kinetics = represent.inflow(model.attachment.spread(q))
+    for rate in detach.rates(q.for_block(detach.name)):
+        kinetics = kinetics.plus(represent.outflow(q, rate), -1)
+    torn = ZERO
+    for rate in detach.forcible_rates(q.for_block(detach.name)):
+        torn = torn.plus(represent.outflow(q, rate))
+    back = ZERO
+    for spread in detach.reattachment(q.for_block(detach.name)):
+        back = back.plus(represent.inflow(spread))
+    kinetics = kinetics.plus(torn, -1).plus(back)
+    others: dict[str, Expr] = {}
+    others.update(detach.derivatives(q.for_block(detach.name, torn_off=torn.m0, reattached=back.m0)))
+    others.update(thin.derivatives(q.for_block(thin.name)))
+    # Heads between attached and torn off stay out of the thick filament's balance: dQ0 + dR.
+    net = kinetics.m0 + torn.m0 - back.m0
+    others.update(thick.derivatives(q.for_block(thick.name, attachment_rate_net=net)))
+    stiffness = sympy.sympify(q.q0)
+    force_rate = kinetics.m0 + kinetics.m1
+    q = q.for_block(model.series.name, kinetic_force_rate=force_rate, stiffness_xb=stiffness)
+    q = q.for_block("composition", ce_velocity=model.series.ce_velocity(q))
+    return kinetics, others, q
+
+
+def _outputs(model: Composition, q: Quantities) -> list[Expr]:
+    """Expressions of `OUTPUTS`."""
+    extension = model.series.extension(q.for_block(model.series.name))
+    force_pe = model.parallel.force(q.for_block(model.parallel.name))
+    force_ce = q.Fscale * q.force_xb
+    return [
+        force_ce + force_pe,
+        force_ce,
+        force_pe,
+        q.length_change - extension / q.gamma,
+        q.ce_velocity / q.gamma,
+        q.q0,
+        q.q1,
+        q.q2,
+        q.available_sites,
+        q.ready_heads,
+        q.forcibly_detached,
+    ]

@@ -1,0 +1,172 @@
+"""Fibre files: one fibre's constants and a parameter set per model, valid as a ROS parameter file."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+import yaml
+
+from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked, complete
+from xb_muscle_ros.models.registry import METHODS, model_of_set
+
+_TOP = ("fibre", "model", "method", "source", "constants", "models")
+
+
+@dataclass(frozen=True)
+class Fibre:
+    """One fibre with the parameter set that was chosen.
+
+    Attributes:
+        name: of the fibre, for example ``18Dec2017a``.
+        model: name of the parameter set, for example ``3state_coop`` or ``3state_coop_v3``.
+        method: representation of the strain distribution, for example ``gaussian``.
+        values: every parameter of the set's model, defaults filled in, in the table's units.
+        reference_length_m: length at rest, one L0.
+        f0_n: isometric force at pCa 4.5, one F0.
+        source: where the values come from.
+        path: the file, or None where the values came as parameters.
+        available_models: sets that the file holds.
+    """
+
+    name: str
+    model: str
+    method: str
+    values: Mapping[str, float]
+    reference_length_m: float
+    f0_n: float
+    source: str
+    path: Path | None
+    available_models: tuple[str, ...]
+
+
+def fibre_folders() -> Iterator[Path]:
+    """Folders where fibre files are looked for: the source tree, then the installed share folders."""
+    here = Path(__file__).resolve()
+    yield here.parents[2] / "config" / "fibers"
+    # With colcon and with pip alike, share/ lies beside the lib/ that holds this package.
+    for parent in here.parents:
+        if parent.name in ("lib", "local"):
+            yield parent.parent / "share" / "xb_muscle_ros" / "config" / "fibers"
+    yield Path(sys.prefix) / "share" / "xb_muscle_ros" / "config" / "fibers"
+
+
+def find_fibre_file(name_or_path: str | Path) -> Path:
+    """Path of a fibre file given as a path, or as the name of a fibre that comes with the package.
+
+    Raises:
+        UserError: there is none; known fibres are named.
+    """
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    known: dict[str, Path] = {}
+    for folder in fibre_folders():
+        for file in sorted(folder.glob("*.yaml")):
+            known.setdefault(file.stem, file)
+    if str(name_or_path) in known:
+        return known[str(name_or_path)]
+    if path.suffix in (".yaml", ".yml") or len(path.parts) > 1:
+        raise UserError(f"fibre file {path} does not exist; give a YAML file or one of {', '.join(sorted(known))}")
+    raise UserError(f"fibre '{name_or_path}' is not known{suggest(str(name_or_path), known)}")
+
+
+def load_fibre(name_or_path: str | Path, model: str | None = None, method: str | None = None) -> Fibre:
+    """Read a fibre file.
+
+    Args:
+        name_or_path: file, or name of a fibre that comes with the package.
+        model: parameter set to pick; the file's default where None.
+        method: representation to use; the file's where None.
+
+    Raises:
+        UserError: file missing or malformed, unknown key, model or parameter, value out of range.
+    """
+    path = find_fibre_file(name_or_path)
+    try:
+        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(f"fibre file {path} cannot be read: {error}") from error
+    except yaml.YAMLError as error:
+        raise UserError(f"fibre file {path} is not valid YAML: {error}; mend the line it names") from error
+    inner: object = tree
+    for key in ("/**", "ros__parameters"):
+        inner = inner.get(key) if isinstance(inner, dict) else None
+    if not isinstance(inner, dict):
+        raise UserError(
+            f"fibre file {path} has no '/**: ros__parameters:' at its top; see config/fibers for files that have"
+        )
+    flat = dict(_flatten(inner, ""))
+    fibre = fibre_from_parameters(flat, f"fibre file {path}", model, method)
+    return Fibre(**{**fibre.__dict__, "path": path})
+
+
+def _flatten(tree: Mapping[object, object], prefix: str) -> Iterator[tuple[str, object]]:
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            yield from _flatten(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def fibre_from_parameters(
+    parameters: Mapping[str, object], where: str, model: str | None = None, method: str | None = None
+) -> Fibre:
+    """Build a fibre from flat ROS parameter names such as ``models.3state_coop.f``.
+
+    Args:
+        parameters: names and values; every one must be known.
+        where: what the messages call the source.
+        model: set to pick; the parameter ``model`` where None.
+        method: see `load_fibre`.
+
+    Raises:
+        UserError: see `load_fibre`.
+    """
+    sets: dict[str, dict[str, float]] = {}
+    constants = {name: row.default for name, row in CONSTANTS.items()}
+    text: dict[str, str] = {}
+    for name, value in parameters.items():
+        head, _, rest = name.partition(".")
+        if head == "models" and "." in rest:
+            set_name, _, parameter = rest.partition(".")
+            model_of_set(set_name)
+            sets.setdefault(set_name, {})[parameter] = checked(
+                parameter, value, PARAMETERS, f"{where}, model {set_name}"
+            )
+        elif head == "constants" and rest:
+            constants[rest] = checked(rest, value, CONSTANTS, where)
+        elif name in _TOP[:4]:
+            text[name] = str(value)
+        else:
+            raise UserError(f"{where}: key '{name}' is not known{suggest(head, _TOP)}")
+    if "fibre" not in text:
+        raise UserError(f"{where}: key 'fibre' is missing; add the name of the fibre")
+    if not sets:
+        raise UserError(f"{where}: there is no parameter set under 'models'; add one, for example 'models: 3state_coop:'")
+    chosen = model or text.get("model") or next(iter(sets))
+    if chosen not in sets:
+        model_of_set(chosen)
+        raise UserError(f"{where}: model '{chosen}' has no parameter set here; there are {', '.join(sets)}")
+    how = method or text.get("method", "gaussian")
+    if how not in METHODS:
+        raise UserError(f"{where}: method '{how}' is not known{suggest(how, METHODS)}")
+    values = complete(sets[chosen], model_of_set(chosen), f"{where}, model {chosen}")
+    for name, number in constants.items():
+        if number is None:
+            raise UserError(f"{where}: constant '{name}' is missing")
+    return Fibre(
+        name=text["fibre"],
+        model=chosen,
+        method=how,
+        values=MappingProxyType(values),
+        reference_length_m=float(constants["reference_length_m"] or 0.0),
+        f0_n=float(constants["f0_n"] or 0.0),
+        source=text.get("source", ""),
+        path=None,
+        available_models=tuple(sets),
+    )

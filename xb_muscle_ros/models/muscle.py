@@ -1,0 +1,205 @@
+"""A fibre ready to step: the one `step` that node, replay, fit and diagnosis share."""
+
+from __future__ import annotations
+
+import enum
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.errors import StateViolation, UserError
+from xb_muscle_ros.models.compiled import compiled
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.registry import compose, model_of_set
+
+Array = npt.NDArray[np.float64]
+
+# The fixed stepper's guard: an embedded error of 1e-4 is 0.02 % of F0; smooth input at 1 ms stays 100 times below it.
+GUARD = 1e-4
+_SETTLE_TOLERANCE = 1e-8
+_SETTLED_RATE = 1e-9
+_LONGEST_SETTLING_S = 1e6
+
+
+class Result(enum.Enum):
+    """How a stretch of integration ended; every member but OK tells the remedy."""
+
+    OK = ""
+    NOT_FINITE = "check the input for jumps and the parameters for extremes, or take a smaller step"
+    OUT_OF_BOUNDS = "check the parameters, or take a smaller step"
+    TOO_MANY_STEPS = "the equations are stiffer than the tolerance allows; loosen it or check the parameters"
+
+
+_RESULTS = tuple(Result)
+
+
+class Outputs(NamedTuple):
+    """What a fibre shows at one moment; forces in F0, lengths in L0, fractions of all heads or sites."""
+
+    force_f0: float
+    force_ce_f0: float
+    force_pe_f0: float
+    ce_length_change_l0: float
+    ce_velocity_l0_per_s: float
+    q0: float
+    q1: float
+    q2: float
+    n_on: float
+    drx: float
+    r: float
+
+
+class Muscle:
+    """One fibre, one model, one method, compiled.
+
+    A state is a vector of shape (n,): the integrated states, then length change (L0), velocity (L0/s) and calcium (µM)
+    of the last step. All methods are pure: they return new states and keep nothing.
+
+    Attributes:
+        fibre: values and constants.
+        state_names: names of the entries of a state vector.
+        parameters: parameter vector in the order of the model's table, read-only.
+    """
+
+    def __init__(self, fibre: Fibre) -> None:
+        """Load the fibre's compiled model, generating and compiling it on the first use on a machine (seconds).
+
+        Raises:
+            UserError: unknown model or method, or nowhere to keep compiled code.
+        """
+        self.fibre = fibre
+        model = model_of_set(fibre.model)
+        rows = compose(model, fibre.method).parameters
+        self.parameters: Array = np.array([fibre.values[row.name] for row in rows])
+        self.parameters.setflags(write=False)
+        self.code: Any = compiled(model, fibre.method, fibre.values["smoothing"] > 0.0)
+        self.state_names: tuple[str, ...] = (*self.code.STATES, "length_change", "velocity", "calcium")
+        self._bounds = {s.name: (s.lower, s.upper) for s in compose(model, fibre.method).states}
+        self._n = int(self.code.N_VECTOR)
+        self._work = np.zeros((4, self._n))
+        self._out = np.zeros(len(Outputs._fields))
+        # One short step now, so that the first real one finds everything compiled.
+        self.outputs(self.step(self.rest(), 0.0, 0.1, 1e-6))
+
+    def rest(self, length_change_l0: float = 0.0) -> Array:
+        """State of a fibre at rest without calcium, at a length change in L0."""
+        state = np.zeros(self._n)
+        self.code.rest(self.parameters, state)
+        state[self.code.LENGTH] = length_change_l0
+        return state
+
+    def settle(self, length_change_l0: float, calcium_um: float, duration_s: float | None = None) -> Array:
+        """State after isometric activation from rest.
+
+        Args:
+            length_change_l0: length change relative to rest, L0.
+            calcium_um: free calcium, µM.
+            duration_s: how long; None: until no state changes by more than 1e-9 1/s, which takes minutes of muscle
+                time at low calcium and milliseconds of computing.
+
+        Raises:
+            UserError: the fibre does not come to rest at this calcium.
+            StateViolation: a state left its bounds.
+        """
+        state = self.rest(length_change_l0)
+        if duration_s is not None:
+            return self._advance(state, length_change_l0, calcium_um, duration_s, 1e-6, _SETTLE_TOLERANCE)
+        rates = np.zeros(int(self.code.N_STATES))
+        chunk, total = 1.0, 0.0
+        while total < _LONGEST_SETTLING_S:
+            state = self._advance(state, length_change_l0, calcium_um, chunk, 1e-6, _SETTLE_TOLERANCE)
+            total += chunk
+            self.code.slope(state, 0.0, calcium_um, self.parameters, rates)
+            if np.max(np.abs(rates)) < _SETTLED_RATE:
+                return state
+            chunk *= 2.0
+        raise UserError(
+            f"fibre {self.fibre.name}, model {self.fibre.model}: not at rest after {total:.3g} s at {calcium_um:g} µM "
+            f"calcium (fastest state still changes by {np.max(np.abs(rates)):.3g} 1/s); give a settling time instead"
+        )
+
+    def step(self, state: Array, length_change_l0: float, calcium_um: float, dt_s: float) -> Array:
+        """State `dt_s` later: length moves linearly to `length_change_l0` (L0), calcium (µM) is held.
+
+        One step of an L-stable method; where its own error estimate exceeds 1e-4 or a state would leave its bounds,
+        the step is halved as often as needed, so that the result holds for any input. Nothing is clipped.
+
+        Raises:
+            StateViolation: no step size leads to an allowed state; names fibre, state and time within the step.
+        """
+        return self._advance(state, length_change_l0, calcium_um, dt_s, dt_s, GUARD)
+
+    def outputs(self, state: Array) -> Outputs:
+        """Forces, contractile element and distribution at a state."""
+        self.code.outputs(state, self.parameters, self._out)
+        return Outputs(*self._out.tolist())
+
+    def outputs_of(self, states: Array) -> dict[str, Array]:
+        """The same for many states, shape (n, state): arrays of shape (n,) by name of `Outputs`."""
+        table = np.zeros((states.shape[0], len(Outputs._fields)))
+        self.code.outputs_of(states, self.parameters, table)
+        return {name: table[:, i].copy() for i, name in enumerate(Outputs._fields)}
+
+    def run(self, state: Array, time_s: Array, length_change_l0: Array, calcium_um: Array, substeps: int = 1) -> Array:
+        """States at every sample, shape (n, state): the result of `step` from sample to sample, bit for bit.
+
+        Args:
+            state: at the first sample.
+            time_s, length_change_l0: shape (n,), s and L0.
+            calcium_um: shape (n,), µM; the k-th acts in the step that ends at the k-th sample.
+            substeps: steps between two samples.
+
+        Raises:
+            StateViolation: see `step`; the time is that of the trial.
+        """
+        states = np.zeros((time_s.size, self._n))
+        arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (time_s, length_change_l0, calcium_um)]
+        code, fault, k, within, _ = self.code.run(state, *arrays, self.parameters, 0.0, GUARD, substeps, states, self._work)
+        if code != 0:
+            self._raise(code, fault, float(arrays[0][max(k - 1, 0)] + within), states[k])
+        return states
+
+    def follow(
+        self,
+        state: Array,
+        corner_s: Array,
+        length_change_l0: Array,
+        calcium_um: Array,
+        sample_s: Array,
+        tolerance: float = 1e-6,
+    ) -> Array:
+        """States at the samples by variable steps that land on every corner of the input.
+
+        Args:
+            state: at the first corner.
+            corner_s, length_change_l0: shape (m,), s and L0; length is linear between corners.
+            calcium_um: shape (m,), µM; the k-th acts up to the k-th corner.
+            sample_s: shape (n,), ascending, within the corners, s.
+            tolerance: error of one step in units of the states (1e-6: about 1e-7 F0).
+
+        Raises:
+            StateViolation: see `step`.
+        """
+        states = np.zeros((sample_s.size, self._n))
+        arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (corner_s, length_change_l0, calcium_um, sample_s)]
+        code, fault, t, _, _ = self.code.follow(state, *arrays, self.parameters, 1e-4, tolerance, states, self._work)
+        if code != 0:
+            self._raise(code, fault, t, self._work[1])
+        return states
+
+    def _advance(self, state: Array, length: float, calcium: float, dt: float, h: float, tolerance: float) -> Array:
+        out = np.empty(self._n)
+        code, fault, t, _, _, _ = self.code.advance(
+            state, length, calcium, dt, self.parameters, h, tolerance, out, self._work
+        )
+        if code != 0:
+            self._raise(code, fault, t, out)
+        return out
+
+    def _raise(self, code: int, fault: int, time_s: float, state: Array) -> None:
+        result = _RESULTS[code]
+        name = self.state_names[fault] if fault >= 0 else "step size"
+        value = float(state[fault]) if fault >= 0 else float("nan")
+        lower, upper = self._bounds.get(name, (float("-inf"), float("inf")))
+        raise StateViolation(self.fibre.name, name, time_s, value, f"{lower:g} to {upper:g}", result.value)

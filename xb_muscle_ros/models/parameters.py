@@ -1,0 +1,80 @@
+"""The parameter table: every physical parameter with unit, meaning, range and source, gathered from the blocks.
+
+It makes the ROS parameter descriptors, and it validates fibre files.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.mechanisms.base import Parameter
+from xb_muscle_ros.models.registry import MODELS, compose
+
+CONSTANTS: Mapping[str, Parameter] = MappingProxyType(
+    {
+        row.name: row
+        for row in (
+            Parameter("reference_length_m", "m", "fibre length at rest: one L0", 1e-9, 10.0, 1.0, "the fibre's record"),
+            Parameter("f0_n", "N", "isometric force at pCa 4.5: one F0", 1e-12, 1e6, 1.0, "the fibre's record"),
+        )
+    }
+)
+
+
+def _gather() -> Mapping[str, Parameter]:
+    rows: dict[str, Parameter] = {}
+    for model in MODELS:
+        for row in compose(model).parameters:
+            rows.setdefault(row.name, row)
+    return MappingProxyType(rows)
+
+
+PARAMETERS: Mapping[str, Parameter] = _gather()
+
+
+def checked(name: str, value: object, table: Mapping[str, Parameter], where: str) -> float:
+    """Return a parameter's value as a float if the table allows it.
+
+    Args:
+        name: the parameter.
+        value: as read; a number.
+        table: rows by name.
+        where: file and set, for the message.
+
+    Raises:
+        UserError: unknown name, not a number, not finite, or out of range.
+    """
+    if name not in table:
+        raise UserError(f"{where}: parameter '{name}' is not known{suggest(name, table)}")
+    row = table[name]
+    allowed = f"allowed is {row.lower:g} to {row.upper:g} {row.unit}"
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise UserError(f"{where}: parameter '{name}' is {value!r}, not a number; {allowed} ({row.meaning})")
+    number = float(value)
+    if not math.isfinite(number) or not row.lower <= number <= row.upper:
+        raise UserError(f"{where}: parameter '{name}' is {number:g} {row.unit}; {allowed} ({row.meaning})")
+    return number
+
+
+def complete(values: Mapping[str, float], model: str, where: str) -> dict[str, float]:
+    """Values of all parameters a model needs, defaults filled in.
+
+    Raises:
+        UserError: a parameter without a default is missing, or one is given that the model does not have.
+    """
+    needed = {row.name: row for row in compose(model).parameters}
+    for name in values:
+        if name not in needed:
+            raise UserError(f"{where}: model {model} has no parameter '{name}'{suggest(name, needed)}")
+    full: dict[str, float] = {}
+    for name, row in needed.items():
+        if name in values:
+            full[name] = values[name]
+        elif row.default is None:
+            raise UserError(f"{where}: model {model} needs parameter '{name}' ({row.meaning}, {row.unit}); add it to the set")
+        else:
+            full[name] = row.default
+    return full

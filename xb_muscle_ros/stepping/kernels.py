@@ -1,0 +1,255 @@
+"""Loops around one Rosenbrock step. Their text is compiled anew beside each model's own step: see `models.codegen`.
+
+Nothing here knows a model: `attempt`, `slope`, `violation` and the sizes stand for those of the generated module. All
+functions are pure: they read the state they are given and write to `out` and `work` only.
+
+A state vector holds the integrated states, then length change (L0), velocity (L0/s) and calcium (µM).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+N_STATES = 0
+N_VECTOR = 0
+LENGTH = 0
+VELOCITY = 0
+CALCIUM = 0
+
+OK, NOT_FINITE, OUT_OF_BOUNDS, TOO_MANY_STEPS = 0, 1, 2, 3
+MAX_ATTEMPTS = 20000
+
+
+# One Rosenbrock step of h seconds into `out`; returns the largest embedded error: (s, h, velocity, calcium, p, out).
+attempt: Callable[[Array, float, float, float, Array, Array], float]
+# Rates of change of the integrated states: (s, velocity, calcium, p, out).
+slope: Callable[[Array, float, float, Array, Array], None]
+# Forces, contractile element and states: (s, p, out).
+outputs: Callable[[Array, Array, Array], None]
+# Index of the first state that is not finite or out of its bounds by more than the slack, else -1: (s, p, slack).
+violation: Callable[[Array, Array, float], int]
+
+
+# BEGIN COMPILED
+def advance(
+    s: Array, length_end: float, calcium: float, dt: float, p: Array, h: float, tol: float, out: Array, work: Array
+) -> Any:
+    """Carry a state over `dt` seconds, in one step of `h` or in as many as the tolerance asks for.
+
+    A step is taken again at a smaller size when its embedded error exceeds `tol` or its result leaves the states' bounds; it is
+    never mended. With `h = dt` this is the fixed stepper, whose tolerance is a guard; with the `h` of the last call it
+    is the variable one.
+
+    Args:
+        s: state vector, shape (N_VECTOR,).
+        length_end: length change at the end, L0; it moves linearly from the state's own.
+        calcium: free calcium, µM, held.
+        dt: duration, s.
+        p: parameter vector.
+        h: first step to try, s.
+        tol: largest embedded error of a step, in units of the states.
+        out: receives the new state vector; on failure the offending one.
+        work: scratch, shape (2, N_VECTOR).
+
+    Returns:
+        (code, index of the state at fault or -1, time reached in s, next step to try in s, steps taken, steps tried)
+    """
+    velocity = (length_end - s[LENGTH]) / dt
+    here = work[0]
+    trial = work[1]
+    for i in range(N_VECTOR):
+        here[i] = s[i]
+    t = 0.0
+    h = min(h, dt)
+    next_h = h
+    taken = 0
+    slack = max(10.0 * tol, 1e-9)
+    code = OK
+    fault = -1
+    tried = 0
+    while t < dt:
+        if tried >= MAX_ATTEMPTS:
+            code = TOO_MANY_STEPS
+            break
+        tried += 1
+        rest = dt - t
+        # Stretch the last step rather than leave a sliver behind.
+        if h > rest * 0.999999:
+            h = rest
+        error = attempt(here, h, velocity, calcium, p, trial)
+        fault = violation(trial, p, slack)
+        if fault < 0 and error <= tol:
+            taken += 1
+            t = dt if h == rest else t + h
+            for i in range(N_STATES):
+                here[i] = trial[i]
+            factor = 5.0 if error <= 0.0 else min(5.0, 0.9 * (tol / error) ** (1.0 / 3.0))
+            grown = h * max(factor, 0.2)
+            # A step cut short by the end of the interval says little about the next one.
+            next_h = max(grown, next_h) if h == rest else grown
+            h = grown
+        else:
+            smaller = 0.25 if fault >= 0 or not error < 1e300 else max(0.1, 0.9 * (tol / error) ** (1.0 / 3.0))
+            h = h * min(smaller, 0.7)
+            next_h = h
+            if h < 1e-12 * dt or h < 1e-15:
+                code = OUT_OF_BOUNDS if fault >= 0 and np.isfinite(trial[fault]) else NOT_FINITE
+                for i in range(N_STATES):
+                    here[i] = trial[i]
+                break
+    for i in range(N_STATES):
+        out[i] = here[i]
+    out[LENGTH] = length_end
+    out[VELOCITY] = velocity
+    out[CALCIUM] = calcium
+    return code, fault, t, next_h, taken, tried
+
+
+def run(
+    s: Array, time: Array, length: Array, calcium: Array, p: Array, max_h: float, tol: float, substeps: int,
+    out: Array, work: Array,
+) -> Any:  # fmt: skip
+    """Follow samples of length and calcium; `out[k]` is the state at `time[k]`, `out[0]` is `s`.
+
+    Args:
+        s: state at time[0].
+        time, length, calcium: shape (n,), s, L0, µM; calcium[k] acts in the step that ends at time[k].
+        max_h: 0 for the fixed stepper, else the variable one with this longest step, s.
+        substeps: steps of the fixed stepper between two samples.
+        out: receives states, shape (n, N_VECTOR).
+        work: scratch, shape (4, N_VECTOR).
+
+    Returns:
+        (code, index of the state at fault, index of the sample reached, time within the step in s, steps tried)
+    """
+    here = work[2]
+    there = work[3]
+    n = time.shape[0]
+    for i in range(N_VECTOR):
+        here[i] = s[i]
+        out[0, i] = s[i]
+    steps = 0
+    h = max_h
+    for k in range(1, n):
+        dt = (time[k] - time[k - 1]) / substeps
+        start = length[k - 1]
+        rise = length[k] - start
+        for j in range(substeps):
+            end = length[k] if j == substeps - 1 else start + rise * ((j + 1) / substeps)
+            code, fault, t, h, _, tried = advance(
+                here, end, calcium[k], dt, p, dt if max_h <= 0.0 else min(h, max_h), tol, there, work
+            )
+            steps += tried
+            for i in range(N_VECTOR):
+                here[i] = there[i]
+            if code != OK:
+                for i in range(N_VECTOR):
+                    out[k, i] = here[i]
+                return code, fault, k, j * dt + t, steps
+        for i in range(N_VECTOR):
+            out[k, i] = here[i]
+    return OK, -1, n - 1, 0.0, steps
+
+
+def follow(
+    s: Array, corner: Array, length: Array, calcium: Array, sample: Array, p: Array, first_h: float, tol: float,
+    out: Array, work: Array,
+) -> Any:  # fmt: skip
+    """Variable steps between the corners of a protocol, landing on each; samples by cubic interpolation (order 3).
+
+    Args:
+        s: state at corner[0].
+        corner, length, calcium: shape (m,), s, L0, µM; length is linear between corners, calcium[k] acts up to corner k.
+        sample: ascending times within the corners, s, shape (n,).
+        first_h: step to try after each corner, s.
+        out: receives states at the samples, shape (n, N_VECTOR).
+        work: scratch, shape (4, N_VECTOR).
+
+    Returns:
+        (code, index of the state at fault, time reached in s, steps tried, steps taken)
+    """
+    here = work[0]
+    there = work[1]
+    before = work[2]
+    after = work[3]
+    for i in range(N_VECTOR):
+        here[i] = s[i]
+    n = sample.shape[0]
+    next_sample = 0
+    while next_sample < n and sample[next_sample] <= corner[0]:
+        for i in range(N_VECTOR):
+            out[next_sample, i] = here[i]
+        next_sample += 1
+    slack = max(10.0 * tol, 1e-9)
+    tried = 0
+    taken = 0
+    for k in range(1, corner.shape[0]):
+        begin = corner[k - 1]
+        dt = corner[k] - begin
+        velocity = (length[k] - length[k - 1]) / dt
+        t = 0.0
+        h = min(first_h, dt)
+        fresh = True
+        while t < dt:
+            rest = dt - t
+            if h > rest * 0.999999:
+                h = rest
+            elif h > 0.5 * rest:
+                h = 0.5 * rest
+            if tried >= MAX_ATTEMPTS:
+                return TOO_MANY_STEPS, -1, begin + t, tried, taken
+            tried += 1
+            error = attempt(here, h, velocity, calcium[k], p, there)
+            fault = violation(there, p, slack)
+            if fault >= 0 or not error <= tol:
+                smaller = 0.25 if fault >= 0 or not error < 1e300 else max(0.1, 0.9 * (tol / error) ** (1.0 / 3.0))
+                h = h * min(smaller, 0.7)
+                if h < 1e-15 or h < 1e-12 * dt:
+                    for i in range(N_STATES):
+                        out[min(next_sample, n - 1), i] = there[i]
+                    code = OUT_OF_BOUNDS if fault >= 0 and np.isfinite(there[fault]) else NOT_FINITE
+                    return code, fault, begin + t, tried, taken
+                continue
+            taken += 1
+            end = dt if h == rest else t + h
+            at_corner = end == dt
+            if next_sample < n and (sample[next_sample] < begin + end or (at_corner and sample[next_sample] <= corner[k])):
+                if fresh:
+                    slope(here, velocity, calcium[k], p, before)
+                slope(there, velocity, calcium[k], p, after)
+                while next_sample < n and (
+                    sample[next_sample] < begin + end or (at_corner and sample[next_sample] <= corner[k])
+                ):
+                    x = (sample[next_sample] - begin - t) / h
+                    a = (1.0 + 2.0 * x) * (1.0 - x) * (1.0 - x)
+                    b = x * (1.0 - x) * (1.0 - x) * h
+                    c = x * x * (3.0 - 2.0 * x)
+                    d = x * x * (x - 1.0) * h
+                    for i in range(N_STATES):
+                        out[next_sample, i] = a * here[i] + b * before[i] + c * there[i] + d * after[i]
+                    out[next_sample, LENGTH] = length[k - 1] + velocity * (t + x * h)
+                    out[next_sample, VELOCITY] = velocity
+                    out[next_sample, CALCIUM] = calcium[k]
+                    next_sample += 1
+                for i in range(N_STATES):
+                    before[i] = after[i]
+                fresh = False
+            else:
+                fresh = True
+            for i in range(N_STATES):
+                here[i] = there[i]
+            t = end
+            h = h * (5.0 if error <= 0.0 else min(5.0, max(0.2, 0.9 * (tol / error) ** (1.0 / 3.0))))
+    return OK, -1, corner[corner.shape[0] - 1], tried, taken
+
+
+def outputs_of(states: Array, p: Array, table: Array) -> None:
+    """Outputs of many states, one row each."""
+    for k in range(states.shape[0]):
+        outputs(states[k], p, table[k])
