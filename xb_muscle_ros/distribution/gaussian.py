@@ -15,14 +15,15 @@ class Gaussian(MomentRepresentation):
     """Q0 times a normal density with mean p = Q1/Q0 and variance q = Q2/Q0 - p²."""
 
     name = "gaussian"
+    # With few heads attached the smooth form divides by more than Q0, and Q2 can fall below zero in fast movements.
     states = (
         State("q0", "1", "fraction of heads attached", 0.0, 1.0),
         State("q1", "power strokes", "first moment of the attached heads over strain", -_FAR, _FAR),
-        State("q2", "power strokes²", "second moment of the attached heads over strain", 0.0, _FAR**2),
+        State("q2", "power strokes²", "second moment of the attached heads over strain", 0.0, _FAR**2, 10.0),
     )
 
     def mean_and_variance(self, q: Quantities) -> tuple[Expr, Expr]:
-        """p and q of the heads' strain."""
+        """P and q of the heads' strain."""
         heads = q.divisor(q.q0)
         mean = q.q1 / heads
         return mean, q.variance(q.q2 / heads - mean**2)

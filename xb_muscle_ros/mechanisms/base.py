@@ -58,6 +58,7 @@ class State(NamedTuple):
         meaning: in a line.
         lower: physical lower bound.
         upper: physical upper bound.
+        blur: how far, in 1/K, the equations with smooth functions themselves carry the state past its bounds.
     """
 
     name: str
@@ -65,6 +66,7 @@ class State(NamedTuple):
     meaning: str
     lower: float
     upper: float
+    blur: float = 0.0
 
 
 class ExponentialRate(NamedTuple):

@@ -19,7 +19,7 @@ def _numeric(*values: Expr) -> bool:
 
 
 def exp(z: Expr) -> Expr:
-    """e to the power z."""
+    """E to the power z."""
     if _numeric(z):
         return math.exp(z)
     import sympy

@@ -124,7 +124,7 @@ def _attempt(e: Equations) -> str:
     solver = Elimination([[entries[i * n + j] != 0 for j in range(n)] for i in range(n)])
     lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
     lines += [*_parameters(e, _used(flat)), *_assignments(flat)]
-    lines += [f"per_h = 1.0 / h", f"diagonal = per_h * {1.0 / rodas3.GAMMA!r}"]
+    lines += ["per_h = 1.0 / h", f"diagonal = per_h * {1.0 / rodas3.GAMMA!r}"]
     for i, j in solver.entries():
         entry = entries[i * n + j]
         value = "" if entry == 0 else f" - ({python(entry)})"
@@ -206,12 +206,13 @@ def _vector(name: str, e: Equations, expressions: Iterable[Any]) -> str:
 
 
 def _violation(e: Equations, smooth: bool) -> str:
-    """Bounds of the states. The smooth functions blur moments by 1/K: their equations leave the exact bounds by that."""
+    """Bounds of the states; the smooth functions of the released sets widen those that they blur."""
     index = [p.name for p in e.parameters].index("smoothing")
-    lines = [f"slack = slack + 1.0 / p[{index}]"] if smooth else []
+    lines = []
     for i, s in enumerate(e.states):
+        room = f"slack + {s.blur!r} / p[{index}]" if smooth and s.blur else "slack"
         # Written so that a NaN fails the comparison.
-        lines += [f"if not ({s.lower!r} - slack <= s[{i}] <= {s.upper!r} + slack):", f"    return {i}"]
+        lines += [f"room = {room}", f"if not ({s.lower!r} - room <= s[{i}] <= {s.upper!r} + room):", f"    return {i}"]
     doc = "First state out of bounds by more than slack, else -1."
     return _function("violation(s, p, slack)", doc, [*lines, "return -1"])
 
@@ -221,5 +222,11 @@ def _kernels() -> str:
     from xb_muscle_ros.stepping import kernels
 
     text = Path(kernels.__file__).read_text(encoding="utf-8").split("# BEGIN COMPILED\n", 1)[1]
-    text = text.replace(": Array", "").replace(" -> Any", "").replace(" -> None", "").replace(": float", "").replace(": int", "")
+    text = (
+        text.replace(": Array", "")
+        .replace(" -> Any", "")
+        .replace(" -> None", "")
+        .replace(": float", "")
+        .replace(": int", "")
+    )
     return text.replace("\ndef ", f"\n{_JIT}\ndef ").replace("def advance", f"{_JIT}\ndef advance", 1)

@@ -54,10 +54,12 @@ def cache_folder() -> Path:
         if os.access(folder, os.W_OK):
             return folder
     tried = ", ".join(str(folder) for folder in choices)
-    raise UserError(f"no folder for compiled models can be written (tried {tried}); set XB_MUSCLE_CACHE to one that can")
+    raise UserError(
+        f"no folder for compiled models can be written (tried {tried}); set XB_MUSCLE_CACHE to one that can"
+    )
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def compiled(model: str, method: str, smooth: bool) -> ModuleType:
     """The compiled module of a model: `advance`, `run`, `follow`, `outputs`, `rest`, `rhs` and its sizes.
 

@@ -134,7 +134,7 @@ def fibre_from_parameters(
         head, _, rest = name.partition(".")
         if head == "models" and "." in rest:
             set_name, _, parameter = rest.partition(".")
-            model_of_set(set_name)
+            model_of_set(set_name, where)
             sets.setdefault(set_name, {})[parameter] = checked(
                 parameter, value, PARAMETERS, f"{where}, model {set_name}"
             )
@@ -147,10 +147,12 @@ def fibre_from_parameters(
     if "fibre" not in text:
         raise UserError(f"{where}: key 'fibre' is missing; add the name of the fibre")
     if not sets:
-        raise UserError(f"{where}: there is no parameter set under 'models'; add one, for example 'models: 3state_coop:'")
+        raise UserError(
+            f"{where}: there is no parameter set under 'models'; add one, for example 'models: 3state_coop:'"
+        )
     chosen = model or text.get("model") or next(iter(sets))
     if chosen not in sets:
-        model_of_set(chosen)
+        model_of_set(chosen, where)
         raise UserError(f"{where}: model '{chosen}' has no parameter set here; there are {', '.join(sets)}")
     how = method or text.get("method", "gaussian")
     if how not in METHODS:

@@ -46,7 +46,7 @@ def positive_part(z: float) -> float:
 
 @njit(cache=True)
 def hyperbolic_tangent(z: float) -> float:
-    """tanh by one exponential: absolute error below 2e-16, half the time of the library's tanh."""
+    """Tanh by one exponential: absolute error below 2e-16, half the time of the library's tanh."""
     return 1.0 - 2.0 / (math.exp(2.0 * z) + 1.0)
 
 

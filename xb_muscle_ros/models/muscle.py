@@ -141,23 +141,26 @@ class Muscle:
         self.code.outputs_of(states, self.parameters, table)
         return {name: table[:, i].copy() for i, name in enumerate(Outputs._fields)}
 
-    def run(self, state: Array, time_s: Array, length_change_l0: Array, calcium_um: Array, substeps: int = 1) -> Array:
+    def run(self, state: Array, dt_s: Array, length_change_l0: Array, calcium_um: Array, substeps: int = 1) -> Array:
         """States at every sample, shape (n, state): the result of `step` from sample to sample, bit for bit.
 
         Args:
             state: at the first sample.
-            time_s, length_change_l0: shape (n,), s and L0.
+            dt_s: shape (n - 1,), time from each sample to the next, s.
+            length_change_l0: shape (n,), L0.
             calcium_um: shape (n,), µM; the k-th acts in the step that ends at the k-th sample.
             substeps: steps between two samples.
 
         Raises:
-            StateViolation: see `step`; the time is that of the trial.
+            StateViolation: see `step`; the time counts from the first sample.
         """
-        states = np.zeros((time_s.size, self._n))
-        arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (time_s, length_change_l0, calcium_um)]
-        code, fault, k, within, _ = self.code.run(state, *arrays, self.parameters, 0.0, GUARD, substeps, states, self._work)
+        states = np.zeros((length_change_l0.size, self._n))
+        arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (dt_s, length_change_l0, calcium_um)]
+        code, fault, k, within, _ = self.code.run(
+            state, *arrays, self.parameters, 0.0, GUARD, substeps, states, self._work
+        )
         if code != 0:
-            self._raise(code, fault, float(arrays[0][max(k - 1, 0)] + within), states[k])
+            self._raise(code, fault, float(arrays[0][: k - 1].sum() + within), states[k])
         return states
 
     def follow(
@@ -199,7 +202,10 @@ class Muscle:
 
     def _raise(self, code: int, fault: int, time_s: float, state: Array) -> None:
         result = _RESULTS[code]
-        name = self.state_names[fault] if fault >= 0 else "step size"
-        value = float(state[fault]) if fault >= 0 else float("nan")
-        lower, upper = self._bounds.get(name, (float("-inf"), float("inf")))
-        raise StateViolation(self.fibre.name, name, time_s, value, f"{lower:g} to {upper:g}", result.value)
+        if fault < 0:
+            raise UserError(f"fibre {self.fibre.name}: integration stopped at t = {time_s:.6g} s; {result.value}")
+        name = self.state_names[fault]
+        lower, upper = self._bounds[name]
+        raise StateViolation(
+            self.fibre.name, name, time_s, float(state[fault]), f"{lower:g} to {upper:g}", result.value
+        )

@@ -74,7 +74,9 @@ def complete(values: Mapping[str, float], model: str, where: str) -> dict[str, f
         if name in values:
             full[name] = values[name]
         elif row.default is None:
-            raise UserError(f"{where}: model {model} needs parameter '{name}' ({row.meaning}, {row.unit}); add it to the set")
+            raise UserError(
+                f"{where}: model {model} needs parameter '{name}' ({row.meaning}, {row.unit}); add it to the set"
+            )
         else:
             full[name] = row.default
     return full

@@ -122,7 +122,7 @@ def jacobian(of: Program, variables: Sequence[Any], prefix: str) -> tuple[Progra
     return Program(lines, of.results), rows
 
 
-class _Python(PythonCodePrinter):  # type: ignore[misc]  # SymPy has no types
+class _Python(PythonCodePrinter):
     """Numba code: scalar functions from `math` and `intrinsics`."""
 
     def _print_Function(self, expr: Any) -> str:
@@ -137,7 +137,7 @@ class _Python(PythonCodePrinter):  # type: ignore[misc]  # SymPy has no types
         return _power(self, expr) or str(super()._print_Pow(expr, rational=rational))
 
 
-class _C(C99CodePrinter):  # type: ignore[misc]  # SymPy has no types
+class _C(C99CodePrinter):
     """C code with the same operations in the same order."""
 
     def _print_Function(self, expr: Any) -> str:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from xb_muscle_ros.distribution.base import MomentRepresentation
 from xb_muscle_ros.distribution.gaussian import Gaussian
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.mechanisms.attachment.gaussian import GaussianAttachment
+from xb_muscle_ros.mechanisms.base import Attachment, Detachment, Parallel, Series, ThickFilament, ThinFilament
 from xb_muscle_ros.mechanisms.detachment.regular import RegularDetachment
 from xb_muscle_ros.mechanisms.parallel.linear import LinearParallel
 from xb_muscle_ros.mechanisms.series.exponential import ExponentialSeries
@@ -17,18 +19,32 @@ from xb_muscle_ros.mechanisms.thin_filament.cooperative import CooperativeThinFi
 from xb_muscle_ros.mechanisms.thin_filament.sigmoid import SigmoidThinFilament
 from xb_muscle_ros.models.composition import Composition
 
-# thin filament, thick filament, attachment, detachment, series, parallel
-_COMMON = (GaussianAttachment, RegularDetachment, ExponentialSeries, LinearParallel)
-MODELS: Mapping[str, tuple[type, ...]] = {
-    "2state": (SigmoidThinFilament, AlwaysOnThickFilament, *_COMMON),
-    "2state_coop": (CooperativeThinFilament, AlwaysOnThickFilament, *_COMMON),
-    "3state_coop": (CooperativeThinFilament, ForceDependentThickFilament, *_COMMON),
+
+class Row(NamedTuple):
+    """The blocks of a model, one of each family; the defaults are those of the paper's cross-bridge models."""
+
+    thin_filament: type[ThinFilament]
+    thick_filament: type[ThickFilament]
+    attachment: type[Attachment] = GaussianAttachment
+    detachment: type[Detachment] = RegularDetachment
+    series: type[Series] = ExponentialSeries
+    parallel: type[Parallel] = LinearParallel
+
+
+MODELS: Mapping[str, Row] = {
+    "2state": Row(SigmoidThinFilament, AlwaysOnThickFilament),
+    "2state_coop": Row(CooperativeThinFilament, AlwaysOnThickFilament),
+    "3state_coop": Row(CooperativeThinFilament, ForceDependentThickFilament),
 }
 METHODS: Mapping[str, type[MomentRepresentation]] = {"gaussian": Gaussian}
 
 
-def model_of_set(name: str) -> str:
+def model_of_set(name: str, where: str = "") -> str:
     """Model that a parameter set of a fibre file belongs to: its name up to ``_v`` and a version number.
+
+    Args:
+        name: of the set.
+        where: begins the message; a file, say.
 
     Raises:
         UserError: no such model; the nearest name is suggested.
@@ -36,7 +52,7 @@ def model_of_set(name: str) -> str:
     stem, _, version = name.rpartition("_v")
     model = stem if stem and version.isdigit() else name
     if model not in MODELS:
-        raise UserError(f"model '{name}' is not known{suggest(name, MODELS)}")
+        raise UserError(f"{where}{': ' if where else ''}model '{name}' is not known{suggest(name, MODELS)}")
     return model
 
 
@@ -48,5 +64,15 @@ def compose(model: str, method: str = "gaussian") -> Composition:
     """
     if method not in METHODS:
         raise UserError(f"method '{method}' is not known{suggest(method, METHODS)}")
-    blocks = [block() for block in MODELS[model_of_set(model)]]
-    return Composition(f"{model_of_set(model)}_{method}", *blocks, representation=METHODS[method]())
+    name = model_of_set(model)
+    row = MODELS[name]
+    return Composition(
+        name=f"{name}_{method}",
+        thin_filament=row.thin_filament(),
+        thick_filament=row.thick_filament(),
+        attachment=row.attachment(),
+        detachment=row.detachment(),
+        series=row.series(),
+        parallel=row.parallel(),
+        representation=METHODS[method](),
+    )

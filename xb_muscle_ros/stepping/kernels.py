@@ -42,9 +42,9 @@ def advance(
 ) -> Any:
     """Carry a state over `dt` seconds, in one step of `h` or in as many as the tolerance asks for.
 
-    A step is taken again at a smaller size when its embedded error exceeds `tol` or its result leaves the states' bounds; it is
-    never mended. With `h = dt` this is the fixed stepper, whose tolerance is a guard; with the `h` of the last call it
-    is the variable one.
+    A step is taken again at a smaller size when its embedded error exceeds `tol` or its result leaves the states'
+    bounds; it is never mended. With `h = dt` this is the fixed stepper, whose tolerance is a guard; with the `h` of
+    the last call it is the variable one.
 
     Args:
         s: state vector, shape (N_VECTOR,).
@@ -112,14 +112,15 @@ def advance(
 
 
 def run(
-    s: Array, time: Array, length: Array, calcium: Array, p: Array, max_h: float, tol: float, substeps: int,
+    s: Array, dt_s: Array, length: Array, calcium: Array, p: Array, max_h: float, tol: float, substeps: int,
     out: Array, work: Array,
 ) -> Any:  # fmt: skip
-    """Follow samples of length and calcium; `out[k]` is the state at `time[k]`, `out[0]` is `s`.
+    """Follow samples of length and calcium; `out[k]` is the state at sample k, `out[0]` is `s`.
 
     Args:
-        s: state at time[0].
-        time, length, calcium: shape (n,), s, L0, µM; calcium[k] acts in the step that ends at time[k].
+        s: state at the first sample.
+        dt_s: shape (n - 1,), time from each sample to the next, s.
+        length, calcium: shape (n,), L0, µM; calcium[k] acts in the step that ends at sample k.
         max_h: 0 for the fixed stepper, else the variable one with this longest step, s.
         substeps: steps of the fixed stepper between two samples.
         out: receives states, shape (n, N_VECTOR).
@@ -130,14 +131,14 @@ def run(
     """
     here = work[2]
     there = work[3]
-    n = time.shape[0]
+    n = length.shape[0]
     for i in range(N_VECTOR):
         here[i] = s[i]
         out[0, i] = s[i]
     steps = 0
     h = max_h
     for k in range(1, n):
-        dt = (time[k] - time[k - 1]) / substeps
+        dt = dt_s[k - 1] / substeps
         start = length[k - 1]
         rise = length[k] - start
         for j in range(substeps):
@@ -165,9 +166,10 @@ def follow(
 
     Args:
         s: state at corner[0].
-        corner, length, calcium: shape (m,), s, L0, µM; length is linear between corners, calcium[k] acts up to corner k.
+        corner, length, calcium: shape (m,), s, L0, µM; length is linear between corners, calcium[k] acts up to
+            corner k.
         sample: ascending times within the corners, s, shape (n,).
-        first_h: step to try after each corner, s.
+        first_h: step to try first, s; it is carried over the corners, where the error control finds the new one.
         out: receives states at the samples, shape (n, N_VECTOR).
         work: scratch, shape (4, N_VECTOR).
 
@@ -189,21 +191,24 @@ def follow(
     slack = max(10.0 * tol, 1e-9)
     tried = 0
     taken = 0
+    h = first_h
     for k in range(1, corner.shape[0]):
         begin = corner[k - 1]
         dt = corner[k] - begin
         velocity = (length[k] - length[k - 1]) / dt
         t = 0.0
-        h = min(first_h, dt)
+        in_interval = 0
         fresh = True
         while t < dt:
             rest = dt - t
+            wanted = h
             if h > rest * 0.999999:
                 h = rest
             elif h > 0.5 * rest:
                 h = 0.5 * rest
-            if tried >= MAX_ATTEMPTS:
+            if in_interval >= MAX_ATTEMPTS:
                 return TOO_MANY_STEPS, -1, begin + t, tried, taken
+            in_interval += 1
             tried += 1
             error = attempt(here, h, velocity, calcium[k], p, there)
             fault = violation(there, p, slack)
@@ -219,7 +224,9 @@ def follow(
             taken += 1
             end = dt if h == rest else t + h
             at_corner = end == dt
-            if next_sample < n and (sample[next_sample] < begin + end or (at_corner and sample[next_sample] <= corner[k])):
+            if next_sample < n and (
+                sample[next_sample] < begin + end or (at_corner and sample[next_sample] <= corner[k])
+            ):
                 if fresh:
                     slope(here, velocity, calcium[k], p, before)
                 slope(there, velocity, calcium[k], p, after)
@@ -245,7 +252,9 @@ def follow(
             for i in range(N_STATES):
                 here[i] = there[i]
             t = end
-            h = h * (5.0 if error <= 0.0 else min(5.0, max(0.2, 0.9 * (tol / error) ** (1.0 / 3.0))))
+            grown = h * (5.0 if error <= 0.0 else min(5.0, max(0.2, 0.9 * (tol / error) ** (1.0 / 3.0))))
+            # A step cut short by the corner says little about the next one.
+            h = max(grown, wanted) if at_corner else grown
     return OK, -1, corner[corner.shape[0] - 1], tried, taken
 
 

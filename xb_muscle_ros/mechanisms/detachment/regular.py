@@ -5,9 +5,13 @@ from __future__ import annotations
 from xb_muscle_ros.mechanisms.base import Detachment, ExponentialRate, Parameter, Quantities, StrainRate
 
 _SOURCE = "van der Zee et al. 2026"
-K11 = Parameter("k11", "1/s", "detachment rate that grows with negative strain, at the power stroke", 0.0, 1e6, None, _SOURCE)
+K11 = Parameter(
+    "k11", "1/s", "detachment rate that grows with negative strain, at the power stroke", 0.0, 1e6, None, _SOURCE
+)
 K12 = Parameter("k12", "1", "how fast that rate grows with negative strain, per power stroke", 0.0, 50.0, 2.0, _SOURCE)
-K21 = Parameter("k21", "1/s", "detachment rate that grows with positive strain, at the power stroke", 0.0, 1e6, None, _SOURCE)
+K21 = Parameter(
+    "k21", "1/s", "detachment rate that grows with positive strain, at the power stroke", 0.0, 1e6, None, _SOURCE
+)
 K22 = Parameter("k22", "1", "how fast that rate grows with positive strain, per power stroke", 0.0, 50.0, None, _SOURCE)
 
 

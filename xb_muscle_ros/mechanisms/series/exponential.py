@@ -7,7 +7,9 @@ from xb_muscle_ros.mechanisms.base import Parameter, Quantities, Series
 from xb_muscle_ros.mechanisms.ops import Expr
 
 KSE = Parameter("kse", "1/power stroke", "exponent of the series spring", 1e-4, 100.0, None, "van der Zee et al. 2026")
-KSE0 = Parameter("kse0", "1", "force scale of the series spring (cross-bridge force)", 1e-6, 1e3, None, "van der Zee et al. 2026")
+KSE0 = Parameter(
+    "kse0", "1", "force scale of the series spring (cross-bridge force)", 1e-6, 1e3, None, "van der Zee et al. 2026"
+)
 
 
 SMOOTH_STIFFNESS = Parameter(

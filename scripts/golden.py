@@ -1,0 +1,40 @@
+"""Compare the models with the authors' output, all cells: golden.py GOLDEN_SRS_JSON [TABLE ...]."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from xb_muscle_ros.bench.golden import QUANTITIES, SETS, STEPPERS, compare
+
+# Table -> largest median and largest single error that are accepted.
+BARS = {"3state_coop": (0.001, 0.02), "3state_coop_v3": (0.001, 0.06), "2state_xb": (0.001, 0.02)}
+
+
+def main(golden: Path, tables: list[str]) -> int:
+    """Print medians and maxima, and every cell beyond its bar; 1 where there is one."""
+    beyond = 0
+    for table in tables:
+        cells = list(compare(golden, table))
+        for stepper in STEPPERS:
+            for quantity in QUANTITIES:
+                errors = [c.error for c in cells if c.stepper == stepper and c.quantity == quantity]
+                print(
+                    f"{table:16s} {stepper:9s} {quantity:17s} {len(errors):5d} cells  "
+                    f"median {100 * np.median(errors):.4f} %  max {100 * max(errors):.3f} %"
+                )
+            median = float(np.median([c.error for c in cells if c.stepper == stepper]))
+            if median > BARS[table][0]:
+                beyond += 1
+                print(f"  median {100 * median:.3f} % is beyond {100 * BARS[table][0]:g} %")
+        for c in cells:
+            if c.error > BARS[table][1]:
+                beyond += 1
+                print(f"  beyond {100 * BARS[table][1]:g} %: {c}")
+    return 1 if beyond else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1]), sys.argv[2:] or list(SETS)))

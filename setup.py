@@ -1,0 +1,72 @@
+"""Build script: read by pip and by colcon (package.xml holds the ROS side of the same facts)."""
+
+from pathlib import Path
+
+from setuptools import find_packages, setup
+
+NAME = "xb_muscle_ros"
+
+
+def files(pattern: str) -> list[str]:
+    """Return the files that match, relative to this folder; data_files takes no patterns of its own."""
+    return sorted(str(path) for path in Path().glob(pattern) if path.is_file())
+
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Cross-bridge muscle for robots and physiologists: fibre length and calcium in, force out",
+    license="Apache-2.0",
+    maintainer="xb_muscle_ros maintainers",
+    maintainer_email="maintainers@users.noreply.github.com",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["py.typed"], f"{NAME}.bench": ["*.c"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/launch", files("launch/*.launch.py")),
+        (f"share/{NAME}/config", files("config/*.yaml")),
+        (f"share/{NAME}/config/fibers", files("config/fibers/*.yaml")),
+        # `ros2 run` and launch look in lib/<package>; pip puts console scripts only in bin/.
+        (f"lib/{NAME}", files("scripts/ros/*")),
+    ],
+    python_requires=">=3.10",
+    install_requires=[
+        "setuptools",
+        "numpy>=1.26",
+        "scipy>=1.11",
+        "numba>=0.58",
+        "matplotlib>=3.6",
+        "PyYAML>=6.0",
+        "sympy>=1.12",
+        "tqdm>=4.64",
+        "mcap>=1.1",
+        "rosbags>=0.11",
+        "lz4>=4.0",
+        "zstandard>=0.20",
+    ],
+    extras_require={
+        "mujoco": ["mujoco>=3.1"],
+        "dask": ["dask>=2024.1", "distributed>=2024.1"],
+        "test": [
+            "pytest",
+            "hypothesis",
+            "ruff",
+            "mypy",
+            "types-PyYAML",
+            "scipy-stubs",
+            "colcon-core",
+            "colcon-ros",
+            "colcon-bash",
+            "colcon-output",
+            "colcon-library-path",
+        ],
+    },
+    entry_points={
+        "console_scripts": [
+            "xb_muscle = xb_muscle_ros.cli.main:console",
+            "muscle_node = xb_muscle_ros.node.main:main",
+        ]
+    },
+    zip_safe=False,
+)

@@ -1,0 +1,118 @@
+"""The command line as a user meets it: exit codes, one line for what is wrong, files that appear whole."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from xb_muscle_ros.cli.main import main
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("bags")
+    code = main(["simulate", "--fiber", "18Dec2017a", "--pca", "6.1", "--out", str(out), "--as-measured"])
+    assert code == 0
+    return out / "simulated_18Dec2017a_amp383_rt1ms_pca61"
+
+
+def complaint(capsys: pytest.CaptureFixture[str], arguments: list[str]) -> str:
+    """The one line that a command that must fail says."""
+    capsys.readouterr()
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert said.startswith("xb_muscle: error: ")
+    assert "Traceback" not in said
+    return said
+
+
+def test_simulate_then_replay_the_same_model(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(bag), "--fiber", "18Dec2017a", "--out", str(tmp_path)]) == 0
+    entry = json.loads((tmp_path / "replay.json").read_text())["trials"][0]
+    # The bag came from variable steps on the exact corners, replay sees their samples: they differ a little.
+    assert 0.0 < entry["rmsd_f0"]["whole"] < 2e-3
+    assert entry["srs_test"] == pytest.approx(entry["measured_srs_test"], rel=0.02)
+    assert "amp383_rt1ms_pca61" in capsys.readouterr().out
+
+
+def test_other_sets_and_fibres(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["replay", str(bag), "--fiber", "13Dec2017a", "--model", "2state", "--out", str(tmp_path)]
+    assert main(arguments) == 0
+    assert "is of fibre 18Dec2017a" in capsys.readouterr().err
+    assert json.loads((tmp_path / "replay.json").read_text())["trials"][0]["model"] == "2state"
+
+
+def test_unknown_fibre(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = complaint(capsys, ["replay", str(bag), "--fiber", "nobody", "--out", str(tmp_path)])
+    assert "fibre 'nobody' is not known" in said
+
+
+def test_unknown_model(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = complaint(
+        capsys, ["replay", str(bag), "--fiber", "18Dec2017a", "--model", "3state_cop", "--out", str(tmp_path)]
+    )
+    assert "did you mean '3state_coop'?" in said
+
+
+def test_missing_bag(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = complaint(capsys, ["replay", str(tmp_path / "none"), "--fiber", "18Dec2017a", "--out", str(tmp_path)])
+    assert str(tmp_path / "none") in said
+
+
+def test_output_that_cannot_be_written(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    said = complaint(capsys, ["replay", str(bag), "--fiber", "18Dec2017a", "--out", str(tmp_path / "file")])
+    assert "cannot be written" in said
+
+
+def test_malformed_fibre_file(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "fibre.yaml"
+    file.write_text("/**:\n  ros__parameters: [")
+    said = complaint(capsys, ["replay", str(bag), "--fiber", str(file), "--out", str(tmp_path)])
+    assert "not valid YAML" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--pca", "99"], "--pca is 99"),
+        (["--amplitude", "-0.1"], "amplitude_l0 is -0.1"),
+        (["--rate", "0"], "--rate is 0"),
+    ],
+)
+def test_impossible_protocols(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: str
+) -> None:
+    said = complaint(capsys, ["simulate", "--fiber", "18Dec2017a", "--out", str(tmp_path), *arguments])
+    assert words in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_live_refuses_what_is_the_nodes(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["replay", str(bag), "--fiber", "18Dec2017a", "--out", str(tmp_path), "--live", "--substeps", "2"]
+    assert "--live leaves steps" in complaint(capsys, arguments)
+
+
+def test_parameters_are_listed_with_unit_and_range(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["parameters", "--fiber", "18Dec2017a"]) == 0
+    line = next(x for x in capsys.readouterr().out.splitlines() if x.startswith("kon "))
+    assert "43.268" in line
+    assert "1/(µM s)" in line
+
+
+def test_bench_writes_its_figures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "bench.json"
+    assert main(["bench", "--study", "rhs", "--out", str(out)]) == 0
+    figures = json.loads(out.read_text())["figures"]
+    assert any("right-hand side, 3state_coop, smooth" == f["name"] for f in figures)
+    assert all(set(f) == {"name", "value", "unit", "spread", "compared_with"} for f in figures)
+    assert all(f["value"] > 0.0 for f in figures)
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(["--version"])
+    assert caught.value.code == 0

@@ -1,0 +1,129 @@
+"""Fibre files: what ships, what is refused, and in which words."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.fibre_file import fibre_from_parameters, find_fibre_file, load_fibre
+from xb_muscle_ros.models.parameters import PARAMETERS
+
+FIBRES = ("13Dec2017a", "13Dec2017b", "14Dec2017b", "18Dec2017a", "18Dec2017b", "19Dec2017a", "7Aug2018a")
+SETS = {"3state_coop": "3state_coop", "3state_coop_v3": "3state_coop_v3", "2state": "2state_xb"}
+
+
+@pytest.mark.parametrize("fibre", FIBRES)
+@pytest.mark.parametrize("model", SETS)
+def test_shipped_values_are_the_released_ones(shared_data: Path, fibre: str, model: str) -> None:
+    released = json.loads((shared_data / "parameters.json").read_text())[SETS[model]][fibre]
+    values = dict(load_fibre(fibre, model).values)
+    assert values.pop("smoothing") == released["K"] == 100.0
+    assert values.pop("smooth_stiffness") == (1.0 if model.endswith("_v3") else 0.0)
+    values.pop("tau_act", None)
+    assert values == {name: released[name] for name in values}
+
+
+@pytest.mark.parametrize("fibre", FIBRES)
+def test_defaults_and_contents(fibre: str) -> None:
+    loaded = load_fibre(fibre)
+    assert loaded.name == fibre
+    assert loaded.model == "3state_coop"
+    assert set(SETS) <= set(loaded.available_models)
+    assert "van der Zee" in loaded.source
+
+
+def text(**changes: object) -> str:
+    tree = yaml.safe_load(find_fibre_file("18Dec2017a").read_text())
+    inner = tree["/**"]["ros__parameters"]
+    for key, value in changes.items():
+        *branches, leaf = key.split("__")
+        branch = inner
+        for name in branches:
+            branch = branch[name]
+        if value is None:
+            del branch[leaf]
+        else:
+            branch[leaf] = value
+    return yaml.safe_dump(tree)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"models__3state_coop__kon": -1.0}, r"'kon' is -1 1/\(µM s\); allowed is 0 to 10000 1/\(µM s\)"),
+        ({"models__3state_coop__kon": float("nan")}, "'kon' is nan"),
+        ({"models__3state_coop__kon": float("inf")}, "'kon' is inf"),
+        ({"models__3state_coop__kon": "much"}, "'kon' is 'much', not a number"),
+        ({"models__3state_coop__kon": True}, "'kon' is True, not a number"),
+        ({"models__3state_coop__konn": 1.0}, "'konn' is not known; did you mean 'kon'?"),
+        ({"models__3state_coop__kappa": 1.0}, "model 3state_coop has no parameter 'kappa'"),
+        ({"models__3state_coop__kon": None}, "needs parameter 'kon'"),
+        ({"models__3state_cop": {"f": 1.0}}, "'3state_cop' is not known; did you mean '3state_coop'?"),
+        ({"modell": "3state_coop"}, "'modell' is not known; did you mean 'model'?"),
+        ({"model": "2state_coop"}, "model '2state_coop' has no parameter set here; there are 2state, 3state_coop"),
+        ({"model": "4state"}, "model '4state' is not known"),
+        ({"method": "gausian"}, "'gausian' is not known; did you mean 'gaussian'?"),
+        ({"fibre": None}, "'fibre' is missing"),
+        ({"constants__f0_n": 0.0}, "'f0_n' is 0 N"),
+        ({"constants__length": 1.0}, "'length' is not known"),
+    ],
+    ids=lambda x: x if isinstance(x, str) else None,
+)
+def test_what_is_wrong_is_named(tmp_path: Path, changes: dict[str, object], message: str) -> None:
+    file = tmp_path / "fibre.yaml"
+    file.write_text(text(**changes))
+    with pytest.raises(UserError, match=message) as caught:
+        load_fibre(file)
+    assert str(file) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("content", ["", "- 1", "/**: 3", "/**:\n  ros__parameters: 4", "a: [1", "\x00"])
+def test_malformed_files_are_one_line(tmp_path: Path, content: str) -> None:
+    file = tmp_path / "fibre.yaml"
+    file.write_text(content)
+    with pytest.raises(UserError) as caught:
+        load_fibre(file)
+    assert "\n" not in str(caught.value)
+
+
+def test_unknown_fibre_suggests_the_nearest() -> None:
+    with pytest.raises(UserError, match="did you mean '18Dec2017a'"):
+        load_fibre("18Dec2017aa")
+
+
+def test_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"none\.yaml does not exist"):
+        load_fibre(tmp_path / "none.yaml")
+
+
+@given(
+    st.dictionaries(
+        st.one_of(st.text(max_size=20), st.sampled_from(["fibre", "model", "models.3state_coop.f", "constants.f0_n"])),
+        st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), st.text(max_size=5), st.lists(st.integers())),
+        max_size=6,
+    )
+)
+def test_any_parameters_either_make_a_fibre_or_a_user_error(parameters: dict[str, object]) -> None:
+    try:
+        fibre = fibre_from_parameters(parameters, "test")
+    except UserError as error:
+        assert "\n" not in str(error)
+    else:
+        assert fibre.model in fibre.available_models
+
+
+def test_every_row_of_the_table_is_complete() -> None:
+    for name, row in PARAMETERS.items():
+        assert row.name == name
+        assert row.unit
+        assert row.meaning
+        assert row.source
+        assert row.lower < row.upper
+        assert row.default is None or row.lower <= row.default <= row.upper

@@ -1,0 +1,127 @@
+"""The facts that setup.py, package.xml, the locks and the tree each hold must agree."""
+
+from __future__ import annotations
+
+import ast
+import re
+import runpy
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
+
+import pytest
+import setuptools
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / "xb_muscle_ros"
+
+# Where the name to import is not the name to install.
+PROVIDED_BY = {"yaml": "pyyaml"}
+
+
+def normal(requirement: str) -> str:
+    """Return the bare name of a requirement as package indexes compare it."""
+    name = re.match(r"[A-Za-z0-9._-]+", requirement.strip())
+    assert name, requirement
+    return re.sub(r"[-_.]+", "-", name[0]).lower()
+
+
+@pytest.fixture
+def arguments(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """What setup.py hands to setuptools."""
+    caught: dict[str, Any] = {}
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setattr(setuptools, "setup", caught.update)
+    runpy.run_path(str(ROOT / "setup.py"))
+    return caught
+
+
+@pytest.fixture
+def manifest() -> ElementTree.Element:
+    """The root element of package.xml."""
+    return ElementTree.parse(ROOT / "package.xml").getroot()
+
+
+def pins(*names: str) -> set[str]:
+    """Return the names pinned in some of the locks."""
+    lines = [line for name in names for line in (ROOT / "requirements" / f"{name}.lock").read_text().splitlines()]
+    return {normal(line) for line in lines if line and not line.startswith("#")}
+
+
+def third_party_imports() -> set[str]:
+    """Return the top-level names the package imports that are neither its own nor Python's."""
+    names: set[str] = set()
+    for path in PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names.update(alias.name.split(".")[0] for alias in node.names)
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                names.add(node.module.split(".")[0])
+    return names - set(sys.stdlib_module_names) - {PACKAGE.name}
+
+
+def test_setup_and_manifest_agree(arguments: dict[str, Any], manifest: ElementTree.Element) -> None:
+    for key in ("name", "version", "description", "license", "maintainer"):
+        assert manifest.findtext(key) == arguments[key]
+    maintainer = manifest.find("maintainer")
+    assert maintainer is not None
+    assert maintainer.get("email") == arguments["maintainer_email"]
+    assert manifest.get("format") == "3"
+    assert manifest.findtext("export/build_type") == "ament_python"
+
+
+def test_version_is_the_one_the_package_tells(arguments: dict[str, Any]) -> None:
+    assert f'__version__ = "{arguments["version"]}"' in (PACKAGE / "__init__.py").read_text()
+
+
+def test_every_folder_with_code_is_packaged(arguments: dict[str, Any]) -> None:
+    folders = {path.parent for path in PACKAGE.rglob("*.py")}
+    assert set(arguments["packages"]) == {".".join(folder.relative_to(ROOT).parts) for folder in folders}
+
+
+def test_every_typed_and_data_file_is_installed(arguments: dict[str, Any]) -> None:
+    assert "py.typed" in arguments["package_data"][PACKAGE.name]
+    installed = {name for _, names in arguments["data_files"] for name in names}
+    data = [*ROOT.glob("config/**/*.yaml"), *ROOT.glob("launch/*"), *ROOT.glob("scripts/ros/*")]
+    expected = {str(path.relative_to(ROOT)) for path in data if path.is_file()}
+    assert expected | {"package.xml", "resource/xb_muscle_ros"} == installed
+
+
+def test_programs_can_be_run_by_ros2_run() -> None:
+    programs = list((ROOT / "scripts" / "ros").iterdir())
+    assert {path.name for path in programs} == {"muscle_node", "xb_muscle"}
+    for path in programs:
+        assert path.stat().st_mode & 0o111
+        assert path.read_text().startswith("#!/usr/bin/env python3\n")
+
+
+def test_locks_pin_what_setup_names(arguments: dict[str, Any]) -> None:
+    assert {normal(name) for name in arguments["install_requires"]} <= pins("base")
+    assert {normal(name) for name in arguments["extras_require"]["test"]} <= pins("base", "test")
+    wanted = (ROOT / "requirements" / "ros.in").read_text().splitlines()
+    assert {normal(line) for line in wanted if line and not line.startswith("#")} <= pins("base", "ros")
+
+
+def test_locks_hold_exact_pins_once_per_python() -> None:
+    for path in (ROOT / "requirements").glob("*.lock"):
+        lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+        assert lines
+        for line in lines:
+            assert re.fullmatch(r"[a-z0-9-]+==[0-9][0-9a-z.]*( ; python_full_version [<>=]+ '3\.\d+')?", line), line
+        assert len(lines) == len({(normal(line), line.partition(";")[2]) for line in lines})
+
+
+def test_every_import_is_declared(arguments: dict[str, Any], manifest: ElementTree.Element) -> None:
+    extras = [name for names in arguments["extras_require"].values() for name in names]
+    declared = {normal(name) for name in [*arguments["install_requires"], *extras]}
+    ros = {normal(element.text or "") for element in manifest.findall("exec_depend")}
+    for name in sorted(third_party_imports()):
+        assert normal(PROVIDED_BY.get(name, name)) in declared | ros, f"{name} is imported but declared nowhere"
+
+
+def test_ros_finds_what_pip_installs(arguments: dict[str, Any], manifest: ElementTree.Element) -> None:
+    without_key = {"mcap", "rosbags", "lz4", "zstandard", "setuptools"}  # left to pip, or there with Python
+    keys = {element.text for element in manifest.findall("exec_depend")}
+    for name in {normal(name) for name in arguments["install_requires"]} - without_key:
+        assert f"python3-{name.removeprefix('py')}" in keys

@@ -1,0 +1,125 @@
+"""Mapping files: every key checked."""
+
+from __future__ import annotations
+
+import copy
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.readers.mapping import build_mapping, load_mapping
+from xb_muscle_ros.trials.readers.units import Quantity
+
+TREE: dict[str, Any] = {
+    "fibre": "f1",
+    "columns": {
+        "time": {"column": "t", "unit": "ms"},
+        "length": {"column": "l", "unit": "mm"},
+        "force": {"column": "f", "unit": "kPa"},
+    },
+    "f0": "100 kPa",
+    "file_name": {"pattern": r"_pca(?P<pca>\d+)", "factors": {"pca": 0.1}},
+    "amplitude_l0": 0.0383,
+    "isometric_scaling": {"source": "a table", "fractions_f0": {4.5: 1.0, "6.1": "0.5"}},
+}
+
+
+def _changed(*path: str, value: Any = None) -> dict[str, Any]:
+    """TREE with one key set, or taken out where the value is None."""
+    tree = copy.deepcopy(TREE)
+    branch = tree
+    for part in path[:-1]:
+        branch = branch[part]
+    if value is None:
+        del branch[path[-1]]
+    else:
+        branch[path[-1]] = value
+    return tree
+
+
+def test_a_good_tree() -> None:
+    made = build_mapping(TREE, "here")
+    assert (made.fibre, made.data_set) == ("f1", "f1")
+    assert made.time.unit.factor == 1e-3
+    assert made.f0 == Quantity(1e5, "stress")
+    assert made.reference_length is None
+    assert made.isometric_fractions == {4.5: 1.0, 6.1: 0.5}
+    assert made.facts_of(Path("x/cell_pca61.csv")) == {"pca": 6.1, "amplitude_l0": 0.0383, "recovery_s": None}
+
+
+def test_a_file_name_that_does_not_match_is_refused() -> None:
+    with pytest.raises(UserError, match=r"cell\.csv: the file name does not match .* of here"):
+        build_mapping(TREE, "here").facts_of(Path("cell.csv"))
+
+
+@pytest.mark.parametrize(
+    ("tree", "words"),
+    [
+        (_changed("fiber", value="x"), "here: unknown fiber; did you mean 'fibre'"),
+        (_changed("columns", "lenght", value={}), "unknown columns.lenght; did you mean 'length'"),
+        (_changed("columns", "time", "units", value="s"), "unknown columns.time.units; did you mean 'unit'"),
+        (_changed("isometric_scaling", "fraction_f0", value={}), "did you mean 'fractions_f0'"),
+        (_changed("file_name", "factors", "pcb", value=1.0), "unknown file_name.factors.pcb; did you mean 'pca'"),
+        (_changed("file_name", "pattern", value=r"(?P<pac>\d+)"), "pattern: pac; did you mean 'pca'"),
+        (_changed("file_name", "pattern", value="("), "is no regular expression"),
+        (_changed("fibre"), "fibre is missing"),
+        (_changed("columns"), "columns.time is missing"),
+        (_changed("columns", "length"), "columns.length is missing"),
+        (_changed("columns", "length", "unit"), "columns.length: unit is missing; give the unit of column 'l'"),
+        (_changed("columns", "length", "unit", value="kPa"), "'kPa' is no unit of length"),
+        (_changed("columns", "length", "is", value="relative"), "columns.length.is is 'relative'; allowed"),
+        (_changed("columns", "length", "is", value="change"), "the reference length has to be given"),
+        (_changed("columns", "time", value="t"), "columns.time is 't'; needed are keys"),
+        (_changed("reference_length", value="42.8"), "reference_length is '42.8'; needed is a number"),
+        (_changed("reference_length", value="1 L0"), "reference_length has to be a length"),
+        (_changed("f0"), "forces are in kPa, so f0 is needed"),
+        (_changed("f0", value="1 N"), "f0 is a force, the force column a stress"),
+        (_changed("columns", "force"), "there is no force column, so f0 has no use"),
+        (_changed("columns", "force", "unit", value="F0"), "forces are in F0, so f0 has no use"),
+        (_changed("pca", value="low"), "pca is 'low'; needed is a finite number"),
+        (_changed("isometric_scaling", "fractions_f0", value={4.5: -1}), "at pCa 4.5 is -1"),
+        (_changed("isometric_scaling", "fractions_f0", value=[1, 2]), "needed is a table"),
+    ],
+)
+def test_a_bad_tree_is_refused_with_a_remedy(tree: dict[str, Any], words: str) -> None:
+    with pytest.raises(UserError) as refused:
+        build_mapping(tree, "here")
+    assert words in str(refused.value)
+    assert "here" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"), [("a: [", "malformed YAML"), ("- a\n- b\n", "needed are keys"), ("", "needed are keys")]
+)
+def test_a_file_that_is_no_mapping_is_refused(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "m.yaml").write_text(text)
+    with pytest.raises(UserError, match=words) as refused:
+        load_mapping(tmp_path / "m.yaml")
+    assert "m.yaml" in str(refused.value)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match=r"no\.yaml cannot be read"):
+        load_mapping(tmp_path / "no.yaml")
+
+
+def test_the_example_of_the_documentation_is_a_mapping(repo_root: Path, tmp_path: Path) -> None:
+    text = (repo_root / "docs" / "bags.md").read_text(encoding="utf-8")
+    (tmp_path / "m.yaml").write_text(text.split("```yaml\n", 1)[1].split("```", 1)[0])
+    made = build_mapping(load_mapping(tmp_path / "m.yaml"), "docs")
+    assert made.facts_of(Path("amp383_rt1ms_pca61.csv")) == {"pca": 6.1, "amplitude_l0": 0.0383, "recovery_s": 0.001}
+
+
+def test_the_isometric_fractions_are_those_of_the_data(repo_root: Path, shared_data: Path) -> None:
+    table = json.loads((shared_data / "empirical_srs.json").read_text())
+    cells = table["fibres"]["18Dec2017a"]["isometric_force"]
+    for name in ("rat_soleus_18Dec2017a.yaml", "rat_soleus_18Dec2017a_triangles.yaml"):
+        path = repo_root / "scripts" / "datasets" / name
+        made = build_mapping(load_mapping(path), str(path))
+        assert sorted(made.isometric_fractions) == table["pCa"]
+        for pca, recoveries in zip(table["pCa"], cells, strict=True):
+            values = [value for row in recoveries for value in row if value is not None]
+            assert made.isometric_fractions[pca] == pytest.approx(sum(values) / len(values), abs=1e-6)

@@ -1,0 +1,86 @@
+"""Delimited text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.readers.table import read_table
+
+
+def _file(folder: Path, text: str, name: str = "t.csv") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a,b\n1,2\n3,4\n",
+        "a;b\n1;2\n3;4",
+        "a\tb\r\n1\t2\r\n3\t4\r\n",
+        "\ufeffa,b\n1,2\n3,4\n",
+        '# made by hand\n"a" , b\n\n1, 2\n# half way\n3 ,4,\n\n',
+    ],
+)
+def test_dialects_read_alike(tmp_path: Path, text: str) -> None:
+    table = read_table(_file(tmp_path, text))
+    assert table.numbers("a").tolist() == [1.0, 3.0]
+    assert table.numbers("b").tolist() == [2.0, 4.0]
+
+
+def test_line_numbers_are_those_of_the_file(tmp_path: Path) -> None:
+    table = read_table(_file(tmp_path, "# comment\na,b\n\n1,2\n3,x\n"))
+    assert [table.line(0), table.line(1)] == [4, 5]
+    with pytest.raises(UserError, match=r"t\.csv, line 5, column 'b' holds 'x'"):
+        table.numbers("b")
+
+
+@pytest.mark.parametrize(("cell", "found"), [("", "nothing"), ("nan", "'nan'"), ("inf", "'inf'"), ("1,5", "'1,5'")])
+def test_a_cell_that_is_no_finite_number_is_named(tmp_path: Path, cell: str, found: str) -> None:
+    table = read_table(_file(tmp_path, f"a;b\n1;2\n3;{cell}\n"))
+    with pytest.raises(UserError, match=f"line 3, column 'b' holds {found}"):
+        table.numbers("b")
+
+
+def test_a_short_line_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="line 3, column 'b' holds nothing"):
+        read_table(_file(tmp_path, "a,b\n1,2\n3\n")).numbers("b")
+
+
+def test_a_missing_column_is_answered_with_those_there(tmp_path: Path) -> None:
+    table = read_table(_file(tmp_path, "time_s,length_m\n1,2\n"))
+    with pytest.raises(
+        UserError, match=r"t\.csv has no column 'length_n'; its columns: time_s, length_m; did you mean"
+    ):
+        table.numbers("length_n")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty"),
+        ("# nothing\n\n", "is empty"),
+        ("a,b\n", "no rows"),
+        ("0,1\n1,2\n", "line 1 holds numbers; needed is a header line"),
+        ("a,a\n1,2\n", "more than one column 'a'"),
+    ],
+)
+def test_what_is_no_table_is_refused(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(UserError, match=words):
+        read_table(_file(tmp_path, text))
+
+
+def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    (tmp_path / "b.csv").write_bytes(b"\xff\xfe\x00a")
+    for path, words in (
+        (tmp_path / "no.csv", "cannot be read"),
+        (tmp_path, "is a folder"),
+        (tmp_path / "b.csv", "UTF-8"),
+    ):
+        with pytest.raises(UserError, match=words) as refused:
+            read_table(path)
+        assert str(path) in str(refused.value)

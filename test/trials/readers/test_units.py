@@ -1,0 +1,49 @@
+"""Units and quantities."""
+
+from __future__ import annotations
+
+import pytest
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.readers.units import Quantity, quantity, unit_of
+
+
+@pytest.mark.parametrize(
+    ("text", "column", "kind", "factor"),
+    [
+        ("ms", "time", "time", 1e-3),
+        ("mm", "length", "length", 1e-3),
+        ("µm", "length", "length", 1e-6),  # micro sign
+        ("μm", "length", "length", 1e-6),  # Greek mu
+        ("%L0", "length", "relative length", 0.01),
+        ("mN", "force", "force", 1e-3),
+        ("kPa", "force", "stress", 1e3),
+        ("mN/mm²", "force", "stress", 1e3),
+        ("F0", "force", "relative force", 1.0),
+        ("nM", "calcium", "calcium", 1e-3),
+        ("M", "calcium", "calcium", 1e6),
+    ],
+)
+def test_units(text: str, column: str, kind: str, factor: float) -> None:
+    assert unit_of(text, column, "here") == (kind, factor)
+
+
+def test_an_unknown_unit_is_answered_with_the_nearest() -> None:
+    with pytest.raises(UserError, match="here: unit 'kpa' of force is not known; did you mean 'kPa'"):
+        unit_of("kpa", "force", "here")
+
+
+def test_a_unit_of_something_else_is_refused() -> None:
+    with pytest.raises(UserError, match="here: 'mm' is no unit of time; allowed: s, ms, us"):
+        unit_of("mm", "time", "here")
+
+
+def test_quantities_come_in_base_units() -> None:
+    assert quantity("42.8 mm", "length", "reference_length", "here") == Quantity(pytest.approx(0.0428), "length")
+    assert quantity(" 97 kPa", "force", "f0", "here") == Quantity(97e3, "stress")
+
+
+@pytest.mark.parametrize("text", ["42.8", "mm", "42.8mm", "-1 mm", "0 mm", "nan mm", "inf mm", "long mm", ""])
+def test_what_is_no_quantity_is_refused(text: str) -> None:
+    with pytest.raises(UserError, match=r"reference_length is '.*'; needed is a number above 0 and its unit"):
+        quantity(text, "length", "reference_length", "here")

@@ -1,0 +1,58 @@
+"""``xb_muscle bench``: measured times, on screen and in ``bench.json``."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from xb_muscle_ros.cli.common import add_fibre
+
+if TYPE_CHECKING:
+    from xb_muscle_ros.cli.common import Subparsers
+
+STUDIES = ("rhs", "trial", "node")
+
+
+def add(subparsers: Subparsers) -> None:
+    """Add the command to the command line."""
+    parser = subparsers.add_parser(
+        "bench", help="measure how fast models and node are", description="Measure; figures also go to bench.json."
+    )
+    add_fibre(parser, required=False)
+    parser.set_defaults(fiber="18Dec2017a")
+    parser.add_argument("--study", nargs="+", choices=STUDIES, default=["rhs", "trial"], help="what to measure")
+    parser.add_argument("--duration", type=float, default=60.0, help="of the node study, s (default 60)")
+    parser.add_argument("--rate", type=float, default=1000.0, help="of the node study, Hz (default 1000)")
+    parser.add_argument(
+        "--out", type=Path, default=Path("bench.json"), help="file for the figures (default bench.json)"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Measure, print, write."""
+    from xb_muscle_ros.bench import right_hand_side, trial_time
+    from xb_muscle_ros.bench.measure import Figure, as_text, machine, merge_into
+    from xb_muscle_ros.cli.common import fibre_of
+    from xb_muscle_ros.models.muscle import Muscle
+
+    fibre = fibre_of(arguments)
+    made: list[Figure] = []
+    if "rhs" in arguments.study or "trial" in arguments.study:
+        exact = replace(fibre, values={**fibre.values, "smoothing": 0.0})
+        muscles = [Muscle(fibre), Muscle(exact)]
+        if "rhs" in arguments.study:
+            made += [f for muscle in muscles for f in right_hand_side.figures(muscle)]
+        if "trial" in arguments.study:
+            made += trial_time.figures(muscles[0])
+            made += [replace(f, name=f"{f.name}, exact") for f in trial_time.figures(muscles[1])]
+    if "node" in arguments.study:
+        from xb_muscle_ros.bench import node_timing
+
+        made += node_timing.figures(arguments.duration, arguments.rate)
+    print(as_text(made))
+    merge_into(arguments.out, made, machine())
+    print(arguments.out)
+    return 0

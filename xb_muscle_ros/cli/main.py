@@ -1,0 +1,50 @@
+"""The command line ``xb_muscle``: one module for each command."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+
+from xb_muscle_ros import __version__
+from xb_muscle_ros.errors import UserError
+
+COMMANDS = ("demo", "import", "simulate", "replay", "bench", "parameters")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The whole command line."""
+    made = argparse.ArgumentParser(prog="xb_muscle", description="Cross-bridge muscle: simulate, replay, measure.")
+    made.add_argument("--version", action="version", version=f"xb_muscle {__version__}")
+    subparsers = made.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for name in COMMANDS:
+        importlib.import_module(f"xb_muscle_ros.cli.{name}_command").add(subparsers)
+    return made
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; returns its exit code. What a user can mend is one line on stderr and code 2."""
+    try:
+        arguments = parser().parse_args(argv)
+        return int(arguments.run(arguments))
+    except UserError as error:
+        print(f"xb_muscle: error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("xb_muscle: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # Whoever read the output has left; point stdout elsewhere, so that the interpreter's last flush is quiet too.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+
+
+def console() -> None:
+    """Entry point of the installed script."""
+    sys.exit(main())
+
+
+if __name__ == "__main__":
+    console()

@@ -1,0 +1,56 @@
+"""``xb_muscle replay``: recordings through the model, offline or through a running node."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from xb_muscle_ros.cli.common import add_fibre, fibre_of, warn
+
+if TYPE_CHECKING:
+    from xb_muscle_ros.cli.common import Subparsers
+
+
+def add(subparsers: Subparsers) -> None:
+    """Add the command to the command line."""
+    parser = subparsers.add_parser(
+        "replay",
+        help="replay bags through the model and compare forces",
+        description="Replay bags through the model; writes replay.json, a figure and the simulated bags.",
+    )
+    parser.add_argument("bags", nargs="+", metavar="BAG", help="bag folder, .mcap file, or folder of bags")
+    add_fibre(parser)
+    parser.add_argument("--out", type=Path, required=True, help="folder for replay.json, figures and simulated bags")
+    parser.add_argument(
+        "--live", action="store_true", help="play the bags through a running muscle_node (mode lockstep)"
+    )
+    parser.add_argument("--substeps", type=int, default=1, help="steps between two samples (default 1, as the node)")
+    parser.add_argument("--settle", type=float, help="isometric time before each trial, s (default: until at rest)")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Replay, print the table, write the files."""
+    from xb_muscle_ros.errors import UserError
+    from xb_muscle_ros.replay.run import replay, write_results
+    from xb_muscle_ros.trials.bags import find_bags, read_trial
+
+    if not 1 <= arguments.substeps <= 10000:
+        raise UserError(f"--substeps is {arguments.substeps}; allowed is 1 to 10000")
+    if arguments.settle is not None and not 0.0 < arguments.settle <= 1e6:
+        raise UserError(f"--settle is {arguments.settle:g} s; allowed is above 0 to 1e6")
+    if arguments.live and (arguments.substeps != 1 or arguments.settle is not None):
+        raise UserError("--live leaves steps and settling to the node; drop --substeps and --settle")
+    fibre = fibre_of(arguments)
+    trials = [read_trial(path) for path in find_bags(arguments.bags)]
+    for trial in trials:
+        for warning in trial.warnings:
+            warn(warning)
+        if trial.facts.fibre != fibre.name:
+            warn(f"trial {trial.facts.trial} is of fibre {trial.facts.fibre}, replayed with parameters of {fibre.name}")
+    results = replay(trials, fibre, arguments.live, arguments.substeps, arguments.settle)
+    print(results.table)
+    for path in write_results(arguments.out, trials, results):
+        print(path)
+    return 0

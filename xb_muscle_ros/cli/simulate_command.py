@@ -1,0 +1,78 @@
+"""``xb_muscle simulate``: the stretch-shorten-stretch protocol through a model, as bags."""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from xb_muscle_ros.cli.common import add_fibre, fibre_of
+
+if TYPE_CHECKING:
+    from xb_muscle_ros.cli.common import Subparsers
+
+
+def add(subparsers: Subparsers) -> None:
+    """Add the command to the command line."""
+    parser = subparsers.add_parser(
+        "simulate",
+        help="simulate stretch-shorten-stretch trials into bags",
+        description="Simulate every combination of the given pCa, amplitudes and recovery times; one bag for each.",
+    )
+    add_fibre(parser)
+    parser.add_argument("--pca", type=float, nargs="+", default=[6.1], help="pCa of the bathing solution (default 6.1)")
+    parser.add_argument(
+        "--amplitude",
+        type=float,
+        nargs="+",
+        default=[0.0383],
+        help="conditioning stretch, L0 (default 0.0383; 0: none)",
+    )
+    parser.add_argument("--recovery", type=float, nargs="+", default=[0.001], help="recovery, s (default 0.001)")
+    parser.add_argument("--rate", type=float, default=1000.0, help="samples per second (default 1000)")
+    parser.add_argument("--settle", type=float, help="isometric time before the trial, s (default: until at rest)")
+    parser.add_argument(
+        "--as-measured",
+        action="store_true",
+        help="also write the force as measured force, to replay the bag like a recording",
+    )
+    parser.add_argument("--prefix", default="simulated", help="begins the names of the bags (default 'simulated')")
+    parser.add_argument("--out", type=Path, default=Path("bags"), help="folder for the bags (default 'bags')")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Simulate and write."""
+    from xb_muscle_ros.errors import UserError
+    from xb_muscle_ros.models.muscle import Muscle
+    from xb_muscle_ros.replay.offline import as_simulated
+    from xb_muscle_ros.trials.bags import write_trial
+    from xb_muscle_ros.trials.protocol import StretchShortenStretch
+
+    fibre = fibre_of(arguments)
+    if not 1.0 <= arguments.rate <= 1e6:
+        raise UserError(f"--rate is {arguments.rate:g} 1/s; allowed is 1 to 1e6")
+    for pca in arguments.pca:
+        if not 3.0 <= pca <= 12.0:
+            raise UserError(f"--pca is {pca:g}; allowed is 3 to 12")
+    muscle = Muscle(fibre)
+    for pca, amplitude, recovery in itertools.product(arguments.pca, arguments.amplitude, arguments.recovery):
+        protocol = StretchShortenStretch(amplitude, recovery)
+        trial = protocol.trial(fibre.name, pca, arguments.rate)
+        calcium = float(trial.calcium_um[0])
+        corner_s, corner_l0 = protocol.corners()
+        state = muscle.settle(0.0, calcium, arguments.settle)
+        # Variable steps from corner to corner: the protocol itself, not its samples.
+        states = muscle.follow(state, corner_s, corner_l0, 0.0 * corner_s + calcium, trial.time_s)
+        simulated = as_simulated(muscle, trial, trial.time_s, states)
+        source = f"simulated: fibre {fibre.name}, model {fibre.model}, method {fibre.method}"
+        trial = replace(trial, facts=replace(trial.facts, source=source))
+        if arguments.as_measured:
+            trial = replace(trial, force_time_s=trial.time_s, force_n=simulated.force_n)
+        path = arguments.out / f"{arguments.prefix}_{fibre.name}_{trial.facts.trial}"
+        write_trial(path, trial, simulated)
+        low, high = simulated.force_n.min(), simulated.force_n.max()
+        print(f"{path}: {trial.time_s.size} samples, force {low:.3f} to {high:.3f} F0")
+    return 0

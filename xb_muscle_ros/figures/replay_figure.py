@@ -1,0 +1,88 @@
+"""Measured against simulated force, a panel for each trial, with the fibre's length above."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, SHADE, figure, save
+from xb_muscle_ros.trials.simulated import Simulated
+from xb_muscle_ros.trials.trial import Trial
+
+_COLUMNS = 3
+_PER_PAGE = 9
+
+
+def draw_replay(
+    path: Path,
+    trials: Sequence[Trial],
+    simulated: Sequence[Simulated],
+    label: str,
+    live: Sequence[Simulated] | None = None,
+) -> list[Path]:
+    """Draw all trials, nine to a page.
+
+    Args:
+        path: of the first page, PNG; a PDF goes beside it. Further pages are called ``<name>_2`` and so on.
+        trials: with or without measured force.
+        simulated: same order.
+        label: what the model's line is called.
+        live: force that came from a node, drawn as dashes on top.
+
+    Returns:
+        paths of the pages.
+    """
+    pages = []
+    for page in range(0, len(trials), _PER_PAGE):
+        here = path if page == 0 else path.with_name(f"{path.stem}_{page // _PER_PAGE + 1}{path.suffix}")
+        chosen = slice(page, page + _PER_PAGE)
+        _page(here, trials[chosen], simulated[chosen], label, live[chosen] if live is not None else None)
+        pages.append(here)
+    return pages
+
+
+def _page(
+    path: Path, trials: Sequence[Trial], simulated: Sequence[Simulated], label: str, live: Sequence[Simulated] | None
+) -> None:
+    columns = min(_COLUMNS, len(trials))
+    rows = -(-len(trials) // columns)
+    with figure(20.0 + 58.0 * columns, 12.0 + 58.0 * rows) as made:
+        grid = made.add_gridspec(rows, columns)
+        handles: list[Any] = []
+        for i, trial in enumerate(trials):
+            cell = grid[i // columns, i % columns].subgridspec(2, 1, height_ratios=(1, 3), hspace=0.05)
+            upper = made.add_subplot(cell[0])
+            lower = made.add_subplot(cell[1], sharex=upper)
+            lines = _panel(upper, lower, trial, simulated[i], label, live[i] if live is not None else None)
+            handles = lines if len(lines) > len(handles) else handles
+            if i % columns == 0:
+                upper.set_ylabel("ΔL (% L$_0$)")
+                lower.set_ylabel("Force (F$_0$)")
+            if i // columns == rows - 1 or i + columns >= len(trials):
+                lower.set_xlabel("Time (s)")
+        made.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False)
+        save(made, path)
+
+
+def _panel(upper: Any, lower: Any, trial: Trial, simulated: Simulated, label: str, live: Simulated | None) -> list[Any]:
+    facts = trial.facts
+    upper.plot(trial.time_s, 100.0 * trial.length_change_l0, color="black", linewidth=1.0)
+    upper.tick_params(labelbottom=False)
+    title = facts.trial if facts.pca is None else f"{facts.trial}  (pCa {facts.pca:g})"
+    upper.set_title(title, loc="left", fontsize=7.5)
+    for phase in facts.phases:
+        if "stretch" in phase.name:
+            for axes in (upper, lower):
+                axes.axvspan(phase.start_s, phase.end_s, color=SHADE, linewidth=0)
+    lines = []
+    if trial.force_time_s.size:
+        lines += lower.plot(trial.force_time_s, trial.measured_f0, color=DATA, linewidth=3.0, label="measured")
+    lines += lower.plot(simulated.time_s, simulated.force_n / facts.f0_n, color=MODEL, label=label)
+    if live is not None:
+        lines += lower.plot(
+            live.time_s, live.force_n / facts.f0_n, color=SECOND, linestyle=(0, (1, 3)), linewidth=1.8,
+            label="through muscle_node",
+        )  # fmt: skip
+    lower.set_ylim(bottom=min(0.0, lower.get_ylim()[0]))
+    return lines

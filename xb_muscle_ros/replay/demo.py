@@ -1,0 +1,84 @@
+"""The main job in one go: recordings to bags, through the model, through the node, into a figure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from xb_muscle_ros.models.fibre_file import find_fibre_file, load_fibre
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.replay.run import replay, write_results
+from xb_muscle_ros.trials.bags import read_trial, write_trial
+from xb_muscle_ros.trials.protocol import StretchShortenStretch
+from xb_muscle_ros.trials.readers.csv import read_csv
+from xb_muscle_ros.trials.readers.mapping import build_mapping, load_mapping
+
+FIBRE = "18Dec2017a"
+_RECORDINGS = Path("../shared/data/recordings")
+_MAPPING = Path("scripts/datasets/rat_soleus_18Dec2017a.yaml")
+_FILES = "rat_soleus_18Dec2017a/amp*.csv"
+_PCAS = (4.5, 6.1, 6.3, 6.6, 9.0)
+
+
+def demo(recordings: Path | None, out: Path, live: bool) -> int:
+    """Run the demo from the top of the source tree; returns the exit code.
+
+    Args:
+        recordings: folder with the recordings of the rat soleus; looked for beside the source tree where None.
+        out: folder for bags, results and figure.
+        live: also through a muscle_node, over DDS.
+
+    Raises:
+        UserError: see `replay`.
+    """
+    files = sorted((recordings or _RECORDINGS).glob(_FILES))
+    if files and _MAPPING.is_file():
+        print(f"{len(files)} recordings of fibre {FIBRE} from {files[0].parent}")
+        bags = _import(files, out / "trials")
+    else:
+        print(f"no recordings at {recordings or _RECORDINGS} ({_FILES}): simulating trials in their place")
+        bags = _simulate(out / "trials")
+    trials = [read_trial(bag) for bag in bags]
+    fibre = load_fibre(FIBRE)
+    offline = replay(trials, fibre)
+    print(f"\n{offline.table}")
+    through_node = None
+    if live:
+        from xb_muscle_ros.node.process import running_node
+
+        with running_node(find_fibre_file(FIBRE), "lockstep"):
+            through_node = replay(trials, fibre, live=True)
+        print(f"\n{through_node.table}")
+        write_results(out / "live", trials, through_node)
+        same = all(
+            bool((a.force_n == b.force_n).all()) and a.force_n.size == b.force_n.size
+            for a, b in zip(offline.simulated, through_node.simulated, strict=True)
+        )
+        print(f"\nforce through the node equals offline replay {'bit for bit' if same else 'NOT BIT FOR BIT'}")
+    print("\nresults:")
+    for path in write_results(out, trials, offline, through_node):
+        print(f"  {path.resolve()}")
+    return 0
+
+
+def _import(files: list[Path], folder: Path) -> list[Path]:
+    mapping = build_mapping(load_mapping(_MAPPING), f"mapping {_MAPPING}")
+    bags = []
+    for file in files:
+        bags.append(folder / file.stem)
+        write_trial(bags[-1], read_csv(file, mapping))
+    return bags
+
+
+def _simulate(folder: Path) -> list[Path]:
+    """Trials of another parameter set of the fibre, in the place of measurements."""
+    stand_in = Muscle(load_fibre(FIBRE, "3state_coop_v3"))
+    bags = []
+    for pca in _PCAS:
+        trial = StretchShortenStretch(0.0383, 0.001).trial(FIBRE, pca)
+        force = simulate_trial(stand_in, trial).force_n
+        facts = replace(trial.facts, source=f"simulated with {stand_in.fibre.model}, in the place of a recording")
+        bags.append(folder / trial.facts.trial)
+        write_trial(bags[-1], replace(trial, facts=facts, force_time_s=trial.time_s, force_n=force))
+    return bags

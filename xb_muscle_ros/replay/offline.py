@@ -1,0 +1,72 @@
+"""A trial through the model, sample by sample: the same steps as the node takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.trials.ros_types import to_ns
+from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
+from xb_muscle_ros.trials.trial import Array, Trial
+
+
+def calcium_per_step(trial: Trial) -> Array:
+    """Calcium (µM) that acts in the step ending at each sample, shape (n,).
+
+    A value holds until the next: the step that ends at sample k uses the newest calcium stamped no later than sample
+    k - 1; the first entry, with which the fibre settles, the newest stamped no later than the first sample.
+
+    Raises:
+        UserError: no calcium is known at the first sample.
+    """
+    starts = np.concatenate([trial.time_s[:1], trial.time_s[:-1]])
+    index = np.searchsorted(trial.calcium_time_s, starts, side="right") - 1
+    if index[0] < 0:
+        raise UserError(
+            f"trial {trial.facts.trial}: first calcium is stamped {trial.calcium_time_s[0]:g} s, after the first length"
+            f" at {trial.time_s[0]:g} s; give the calcium that the fibre starts with"
+        )
+    held: Array = trial.calcium_um[index]
+    return held
+
+
+def simulate_trial(muscle: Muscle, trial: Trial, substeps: int = 1, settle_s: float | None = None) -> Simulated:
+    """Settle isometrically at the first sample, then step from sample to sample.
+
+    Args:
+        muscle: the fibre.
+        trial: length and calcium; length is linear between samples, calcium holds.
+        substeps: steps between two samples; 1 is what the node does.
+        settle_s: time to settle, s; None until at rest.
+
+    Raises:
+        UserError: no calcium at the start.
+        StateViolation: see `Muscle.step`.
+    """
+    length = trial.length_change_l0
+    calcium = calcium_per_step(trial)
+    state = muscle.settle(float(length[0]), float(calcium[0]), settle_s)
+    # Whole nanoseconds, as message stamps have them: the node computes the same differences.
+    dt_s = np.diff(to_ns(trial.time_s)) / 1e9
+    states = muscle.run(state, dt_s, length, calcium, substeps)
+    return as_simulated(muscle, trial, trial.time_s, states)
+
+
+def as_simulated(muscle: Muscle, trial: Trial, time_s: Array, states: Array) -> Simulated:
+    """States of a trial in SI units."""
+    out = muscle.outputs_of(states)
+    reference = trial.facts.reference_length_m
+    return Simulated(
+        time_s=time_s,
+        force_n=out["force_f0"] * trial.facts.f0_n,
+        ce_length_m=reference * (1.0 + out["ce_length_change_l0"]),
+        ce_velocity_m_per_s=reference * out["ce_velocity_l0_per_s"],
+        moments={name: out[name] for name in MOMENTS},
+    )
+
+
+Simulator = Callable[[Trial], Simulated]
+"""What replay compares with a recording: offline steps, or a node on the other side of DDS."""

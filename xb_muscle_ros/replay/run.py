@@ -1,0 +1,91 @@
+"""A whole replay: all trials through the model or a node, records, table, files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.replay.report import Record, add_relative_stiffness, record, table, write_json
+from xb_muscle_ros.trials.bags import write_trial
+from xb_muscle_ros.trials.simulated import Simulated
+from xb_muscle_ros.trials.trial import Trial
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Results of a replay, in the order of the trials.
+
+    Attributes:
+        fibre: parameters used.
+        live: whether a node made the forces.
+        simulated: one for each trial.
+        records: entries of ``replay.json``.
+        table: the same for the screen.
+    """
+
+    fibre: Fibre
+    live: bool
+    simulated: tuple[Simulated, ...]
+    records: tuple[Record, ...]
+    table: str
+
+
+def replay(
+    trials: Sequence[Trial], fibre: Fibre, live: bool = False, substeps: int = 1, settle_s: float | None = None
+) -> Replay:
+    """Replay trials.
+
+    Args:
+        trials: at least one, names unique.
+        fibre: parameters.
+        live: through a running ``muscle_node`` in lockstep instead of offline.
+        substeps, settle_s: see `simulate_trial`; offline only.
+
+    Raises:
+        UserError: trial names repeat, or the node cannot be used.
+        StateViolation: see `Muscle.step`.
+    """
+    names = [trial.facts.trial for trial in trials]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise UserError(
+            f"trial name {repeated[0]} comes {names.count(repeated[0])} times; replay its bags in separate runs"
+        )
+    if live:
+        # The only place offline tools touch ROS, and only when asked to.
+        from xb_muscle_ros.node.player import play_live
+
+        simulated = tuple(play_live(trials, fibre))
+    else:
+        muscle = Muscle(fibre)
+        simulated = tuple(simulate_trial(muscle, trial, substeps, settle_s) for trial in trials)
+    records = [record(trial, one, fibre) for trial, one in zip(trials, simulated, strict=True)]
+    add_relative_stiffness(records)
+    how = "live, through muscle_node" if live else "offline"
+    title = f"fibre {fibre.name}, model {fibre.model}, method {fibre.method} ({how})"
+    return Replay(fibre, live, simulated, tuple(records), table(records, title))
+
+
+def write_results(folder: Path, trials: Sequence[Trial], results: Replay, live: Replay | None = None) -> list[Path]:
+    """Write ``replay.json``, the figure and one simulated bag per trial; returns what to look at.
+
+    Args:
+        folder: made if need be.
+        trials: as replayed.
+        results: of the replay.
+        live: a second replay of the same trials, drawn on top.
+    """
+    from xb_muscle_ros.figures.replay_figure import draw_replay
+
+    facts = {"fibre": results.fibre.name, "model": results.fibre.model, "method": results.fibre.method}
+    write_json(folder / "replay.json", results.records, {**facts, "live": results.live, "source": results.fibre.source})
+    label = f"{results.fibre.model} ({'live' if results.live else 'offline'})"
+    pages = draw_replay(folder / "replay.png", trials, results.simulated, label, live.simulated if live else None)
+    for trial, simulated in zip(trials, results.simulated, strict=True):
+        write_trial(folder / "bags" / trial.facts.trial, trial, simulated)
+    return [folder / "replay.json", *pages]

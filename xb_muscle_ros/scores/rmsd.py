@@ -1,0 +1,50 @@
+"""Root-mean-square deviation of force in the paper's windows."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from xb_muscle_ros.trials.protocol import TEST_DURATION_S
+from xb_muscle_ros.trials.trial import Array, Trial
+
+# The paper's whole window reaches one test stretch's duration beyond the stretches on either side.
+MARGIN_S = TEST_DURATION_S
+
+
+def windows(trial: Trial) -> dict[str, tuple[float, float] | None]:
+    """Time windows (s) named ``whole``, ``conditioning`` and ``test``; None where the trial lacks the phase.
+
+    ``whole`` runs from 0.0843 s before the first stretch to 0.0843 s after the test stretch (van der Zee et al. 2026),
+    as far as the trial goes; trials of other protocols are taken whole.
+    """
+    phases = trial.phases_by_name()
+    conditioning, test = phases.get("conditioning_stretch"), phases.get("test_stretch")
+    start, end = float(trial.time_s[0]), float(trial.time_s[-1])
+    whole = (start, end)
+    first = conditioning or test
+    if first is not None and test is not None:
+        whole = (max(start, first.start_s - MARGIN_S), min(end, test.end_s + MARGIN_S))
+    return {
+        "whole": whole,
+        "conditioning": (conditioning.start_s, conditioning.end_s) if conditioning else None,
+        "test": (test.start_s, test.end_s) if test else None,
+    }
+
+
+def force_rmsd(time_s: Array, simulated: Array, measured: Array, window: tuple[float, float] | None) -> float | None:
+    """Root-mean-square of simulated - measured within a window, in the unit of the forces.
+
+    Args:
+        time_s, simulated, measured: shape (n,), at the same times.
+        window: start and end, s, both inclusive; None gives None.
+
+    Returns:
+        None where no sample lies in the window.
+    """
+    if window is None:
+        return None
+    # Half a nanosecond of grace: phases are computed, stamps are whole nanoseconds.
+    inside = (time_s >= window[0] - 5e-10) & (time_s <= window[1] + 5e-10)
+    if not np.any(inside):
+        return None
+    return float(np.sqrt(np.mean((simulated[inside] - measured[inside]) ** 2)))

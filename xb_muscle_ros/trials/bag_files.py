@@ -1,0 +1,88 @@
+"""Where bags lie: finding them, and telling a bag folder from any other."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from xb_muscle_ros.errors import UserError
+
+METADATA = "metadata.yaml"
+
+
+def find_bags(paths: Iterable[str | Path]) -> list[Path]:
+    """Bags named by the user.
+
+    Args:
+        paths: each a bag folder, an ``.mcap`` file, or a folder of bags (looked at one level deep, sorted by name).
+
+    Returns:
+        Bag folders and ``.mcap`` files in the order given, each once.
+
+    Raises:
+        UserError: a path does not exist or holds no bag.
+    """
+    found: dict[Path, Path] = {}
+    for path in map(Path, paths):
+        for bag in _bags_at(path):
+            found.setdefault(bag.resolve(), bag)
+    return list(found.values())
+
+
+def mcap_files(folder: Path) -> list[Path]:
+    """The ``.mcap`` files of a folder in the order they were recorded: by the number rosbag2 gives them."""
+
+    def number(file: Path) -> tuple[int, str]:
+        match = re.search(r"_(\d+)$", file.stem)
+        return (int(match.group(1)) if match else 0, file.name)
+
+    return sorted((f for f in folder.glob("*.mcap") if f.is_file()), key=number)
+
+
+def check_replaceable(path: Path) -> None:
+    """Make sure that writing a bag to ``path`` destroys nothing but an older bag.
+
+    Raises:
+        UserError: the path is a file, or a folder with anything in it that does not belong to a bag.
+    """
+    if not path.name or path.name == "..":
+        raise UserError(f"bag {path} has no name of its own; give the folder to make")
+    if not path.exists() and not path.is_symlink():
+        return
+    if not path.is_dir() or path.is_symlink():
+        raise UserError(f"bag {path} cannot be written: something that is no bag folder has this name; choose another")
+    foreign = sorted(f.name for f in path.iterdir() if f.name != METADATA and f.suffix != ".mcap")
+    if foreign:
+        raise UserError(
+            f"bag {path} cannot be written: it holds '{foreign[0]}', which belongs to no bag; choose another name"
+        )
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a folder is one bag: it has metadata, or its ``.mcap`` files carry its name."""
+    if not path.is_dir():
+        return False
+    if (path / METADATA).is_file():
+        return True
+    files = mcap_files(path)
+    named_after = all(re.fullmatch(re.escape(path.name) + r"(_\d+)?", file.stem) for file in files)
+    return len(files) == 1 or (bool(files) and named_after)
+
+
+def _bags_at(path: Path) -> list[Path]:
+    if not path.exists():
+        raise UserError(f"bag {path} does not exist; give a bag folder, an .mcap file or a folder of bags")
+    if path.is_file():
+        if path.suffix != ".mcap":
+            raise UserError(f"{path} is no bag; allowed are bag folders, .mcap files and folders of bags")
+        return [path]
+    if is_bag(path):
+        return [path]
+    inside = sorted(p for p in path.iterdir() if not p.name.startswith("."))
+    bags = [p for p in inside if is_bag(p) or (p.is_file() and p.suffix == ".mcap")]
+    if not bags:
+        raise UserError(
+            f"{path} holds no bag; needed is a folder with {METADATA} or an .mcap file, or a folder of such"
+        )
+    return bags

@@ -1,0 +1,182 @@
+"""Straight pieces of a length record and the corners between them.
+
+A ramp imposed on a fibre is a straight line; its recording has noise and, where it was smoothed, rounded corners.
+Lines fitted to the middles of the pieces are free of both, so a corner is taken where two neighbouring lines meet.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.trials.trial import Array
+
+# A slope belongs to a ramp above this fraction of the fastest slope, so that halves of rounded corners are split.
+RAMP_FRACTION = 0.3
+# The slope's noise (standard deviation) has to be this much smaller than the fastest slope.
+NOISE_FRACTION = 0.08
+# A slope has to last this many samples to count as the fastest.
+LASTING_SAMPLES = 6
+# Half-windows of the slope estimate, samples; the smallest quiet enough is used, so that short ramps stay visible.
+HALF_WINDOWS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
+# Ramps below these are wobble: relative to the largest ramp, and to the length itself.
+SMALLEST_RAMP = 0.01
+SMALLEST_STRAIN = 3e-4
+# A pause of fewer samples cannot be told from a rounded corner: filters and motors round over some 12 ms at 1 kHz.
+SHORTEST_PAUSE = 9
+# A level next to a corner is taken from at most this many samples, so that slow drift further away does not count.
+LEVEL_SAMPLES = 100
+
+
+class Piece(NamedTuple):
+    """A straight piece of a length record.
+
+    Attributes:
+        direction: +1 stretch, 0 isometric, -1 shortening.
+        start_s: begin, s.
+        end_s: end, s.
+        line: slope (length unit per s) and offset (length unit, at time 0).
+    """
+
+    direction: int
+    start_s: float
+    end_s: float
+    line: tuple[float, float]
+
+
+class _Run(NamedTuple):
+    direction: int
+    first: int
+    last: int  # inclusive
+
+    @property
+    def samples(self) -> int:
+        return self.last - self.first + 1
+
+
+def straight_pieces(time_s: Array, length: Array) -> list[Piece]:
+    """Split a length record into straight pieces.
+
+    Args:
+        time_s: shape (n,), strictly increasing, s.
+        length: shape (n,), length (not its change) in any unit.
+
+    Returns:
+        Pieces in order of time that touch each other and cover the whole record; the level of an isometric piece is
+        its line's offset.
+    """
+    slope, half_window = _quiet_slope(time_s, length)
+    runs = _ramp_runs(length, slope, half_window)
+    lines = [_line(time_s, length, run, half_window) for run in runs]
+    corners = [float(time_s[0])]
+    for left, right, after in zip(range(len(runs)), range(1, len(runs)), runs[1:], strict=False):
+        low = 0.5 * (time_s[runs[left].first] + time_s[runs[left].last])
+        high = 0.5 * (time_s[after.first] + time_s[after.last])
+        met = _meeting(
+            _facing_line(time_s, length, runs[left], lines[left], half_window, at_end=True),
+            _facing_line(time_s, length, after, lines[right], half_window, at_end=False),
+        )
+        # Lines that meet outside both pieces are no corner of theirs; the sample where the direction changed then is.
+        corners.append(met if met is not None and low <= met <= high else float(time_s[after.first]))
+    corners.append(float(time_s[-1]))
+    return [Piece(run.direction, corners[i], corners[i + 1], lines[i]) for i, run in enumerate(runs)]
+
+
+def _quiet_slope(time_s: Array, length: Array) -> tuple[Array, int]:
+    """Slope of the length over the smallest window that keeps its noise down; zero where no window does."""
+    for half_window in HALF_WINDOWS:
+        if time_s.size < 4 * half_window + 3:
+            break
+        slope = _slope(time_s, length, half_window)
+        fastest = _fastest(slope)
+        apart = slope[2 * half_window + 1 :] - slope[: -(2 * half_window + 1)]
+        noise = 1.4826 * float(np.median(np.abs(apart))) / np.sqrt(2.0)
+        if noise <= NOISE_FRACTION * fastest:
+            return slope, half_window
+    return np.zeros_like(length), 1
+
+
+def _fastest(slope: Array) -> float:
+    """The fastest slope that lasts: a glitch of one sample is faster than any ramp."""
+    windows = np.lib.stride_tricks.sliding_window_view(slope, min(LASTING_SAMPLES, slope.size))
+    return float(max(np.max(np.min(windows, axis=1)), -np.min(np.max(windows, axis=1)), 0.0))
+
+
+def _slope(time_s: Array, length: Array, half_window: int) -> Array:
+    """Mean of the samples after minus mean of those before, over the time between; shape (n,)."""
+
+    def after_minus_before(values: Array) -> Array:
+        total = np.concatenate(([0.0], np.cumsum(values - values[0])))
+        centre = np.arange(half_window, values.size - half_window)
+        after = total[centre + half_window + 1] - total[centre + 1]
+        before = total[centre] - total[centre - half_window]
+        result: Array = (after - before) / half_window
+        return result
+
+    inner = after_minus_before(length) / after_minus_before(time_s)
+    return np.pad(inner, half_window, mode="edge")
+
+
+def _ramp_runs(length: Array, slope: Array, half_window: int) -> list[_Run]:
+    """Runs of samples with one direction; wobble and pauses shorter than the slope's window are not runs."""
+    fastest = _fastest(slope)
+    moving = np.abs(slope) > RAMP_FRACTION * fastest if fastest > 0.0 else np.zeros(slope.size, dtype=bool)
+    runs = _split((np.sign(slope) * moving).astype(np.int64))
+    rise = [abs(float(length[run.last] - length[run.first])) if run.direction else 0.0 for run in runs]
+    smallest = max(SMALLEST_RAMP * max(rise), SMALLEST_STRAIN * abs(float(np.median(length))))
+    runs = _merge([run if up >= smallest else run._replace(direction=0) for run, up in zip(runs, rise, strict=True)])
+    shortest_pause = max(SHORTEST_PAUSE, 2 * half_window + 1)
+    # The samples of shorter pauses belong to no piece: neither line is fitted to them.
+    seen = [run for run in runs if run.direction or run.samples >= shortest_pause]
+    return _merge(seen or runs)
+
+
+def _split(directions: npt.NDArray[np.int64]) -> list[_Run]:
+    edges = [0, *(np.flatnonzero(np.diff(directions)) + 1).tolist(), directions.size]
+    return [_Run(int(directions[a]), a, b - 1) for a, b in itertools.pairwise(edges)]
+
+
+def _merge(runs: list[_Run]) -> list[_Run]:
+    merged = runs[:1]
+    for run in runs[1:]:
+        if run.direction == merged[-1].direction:
+            merged[-1] = merged[-1]._replace(last=run.last)
+        else:
+            merged.append(run)
+    return merged
+
+
+def _core(run: _Run, half_window: int) -> slice:
+    """The samples of a run without its rounded ends."""
+    trim = min(max(int(np.ceil(0.15 * run.samples)), half_window), run.samples // 4)
+    return slice(run.first + trim, run.last + 1 - trim)
+
+
+def _line(time_s: Array, length: Array, run: _Run, half_window: int) -> tuple[float, float]:
+    """Straight line (slope, offset) through the middle of a run; a level where the run is isometric."""
+    core = _core(run, half_window)
+    if run.direction == 0 or run.samples < 2:
+        return 0.0, float(np.mean(length[core]))
+    middle = float(np.mean(time_s[core]))  # centred: times may be large against their spread
+    slope, level = np.polyfit(time_s[core] - middle, length[core], 1)
+    return float(slope), float(level - slope * middle)
+
+
+def _facing_line(
+    time_s: Array, length: Array, run: _Run, line: tuple[float, float], half_window: int, *, at_end: bool
+) -> tuple[float, float]:
+    """The run's line, or for an isometric run the level of the samples nearest the corner."""
+    if run.direction != 0:
+        return line
+    core = length[_core(run, half_window)]
+    return 0.0, float(np.mean(core[-LEVEL_SAMPLES:] if at_end else core[:LEVEL_SAMPLES]))
+
+
+def _meeting(left: tuple[float, float], right: tuple[float, float]) -> float | None:
+    """Time at which two lines meet, s; None for parallels."""
+    if left[0] == right[0]:
+        return None
+    return (right[1] - left[1]) / (left[0] - right[0])

@@ -1,0 +1,95 @@
+"""Trial facts as the strings of a bag's ``custom_data``, and back."""
+
+from __future__ import annotations
+
+import json
+import math
+import unicodedata
+from collections.abc import Mapping
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.trial import Phase, TrialFacts
+
+_CONTROL = ("Cc", "Cs", "Zl", "Zp")
+_OPTIONAL_NUMBERS = ("pca", "amplitude_l0", "recovery_s")
+_POSITIVE_NUMBERS = ("reference_length_m", "f0_n")
+
+
+def facts_to_custom_data(facts: TrialFacts) -> dict[str, str]:
+    """Facts as strings; facts that are not known are left out.
+
+    Numbers are written as Python writes them, so that they come back bit for bit; phases as JSON.
+
+    Raises:
+        UserError: a text has a line break or another control character, which YAML readers do not agree on.
+    """
+    for name in ("fibre", "trial", "source"):
+        bad = next((c for c in getattr(facts, name) if unicodedata.category(c) in _CONTROL), None)
+        if bad is not None:
+            raise UserError(f"{name} holds the control character {bad!r}; allowed is text on one line")
+    data = {"fibre": facts.fibre, "trial": facts.trial, "source": facts.source}
+    for name in _OPTIONAL_NUMBERS + _POSITIVE_NUMBERS:
+        value = getattr(facts, name)
+        if value is not None:
+            data[name] = repr(float(value))
+    data["phases"] = json.dumps(
+        [{"name": p.name, "start_s": float(p.start_s), "end_s": float(p.end_s)} for p in facts.phases]
+    )
+    return data
+
+
+def facts_from_custom_data(data: Mapping[str, str], where: str, fibre: str, trial: str) -> TrialFacts:
+    """Facts from ``custom_data``; other keys are left alone.
+
+    Args:
+        data: the bag's strings.
+        where: the bag, for messages.
+        fibre: used where the data name no fibre.
+        trial: used where the data name no trial.
+
+    Raises:
+        UserError: a number or the phases cannot be read.
+    """
+    optional = {name: _number(data[name], name, where) for name in _OPTIONAL_NUMBERS if name in data}
+    positive = {name: _number(data[name], name, where) for name in _POSITIVE_NUMBERS if name in data}
+    for name, value in positive.items():
+        if value <= 0.0:
+            raise UserError(f"bag {where}: custom_data {name} is {value!r}; allowed are numbers above 0")
+    return TrialFacts(
+        fibre=data.get("fibre", fibre),
+        trial=data.get("trial", trial),
+        pca=optional.get("pca"),
+        amplitude_l0=optional.get("amplitude_l0"),
+        recovery_s=optional.get("recovery_s"),
+        reference_length_m=positive.get("reference_length_m", 1.0),
+        f0_n=positive.get("f0_n", 1.0),
+        phases=_phases(data.get("phases", "[]"), where),
+        source=data.get("source", ""),
+    )
+
+
+def _number(text: str, name: str, where: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise UserError(f"bag {where}: custom_data {name} is '{text}'; allowed are finite numbers")
+    return value
+
+
+def _phases(text: str, where: str) -> tuple[Phase, ...]:
+    try:
+        phases = tuple(Phase(str(p["name"]), float(p["start_s"]), float(p["end_s"])) for p in json.loads(text))
+    except (ValueError, TypeError, KeyError) as problem:
+        raise UserError(
+            f"bag {where}: custom_data phases cannot be read ({problem}); "
+            'needed is a JSON list of {"name": ..., "start_s": ..., "end_s": ...}'
+        ) from None
+    for phase in phases:
+        if not (math.isfinite(phase.start_s) and math.isfinite(phase.end_s) and phase.start_s <= phase.end_s):
+            raise UserError(
+                f"bag {where}: custom_data phase {phase.name} goes from {phase.start_s} to {phase.end_s} s; "
+                "allowed are finite times, the end not before the start"
+            )
+    return phases

@@ -1,0 +1,119 @@
+"""Phases of a trial found from its length record: the paper's protocol, or stretches and shortenings by turns.
+
+The protocol is isometric, conditioning stretch, shortening back, recovery, test stretch, hold; without the first
+stretch (the reference trial) isometric, test stretch, hold. Anything else is told as ``isometric``, ``stretch`` and
+``shortening`` in order of time.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from xb_muscle_ros.trials.corners import Piece, straight_pieces
+from xb_muscle_ros.trials.trial import Array, Phase
+
+_CONDITIONED = (1, -1, 1)
+_REFERENCE = (1,)
+_CONDITIONED_NAMES = ("conditioning_stretch", "shortening", "test_stretch")
+
+
+def detect_phases(
+    time_s: Array, length: Array, amplitude_l0: float | None = None, recovery_s: float | None = None
+) -> tuple[Phase, ...]:
+    """Find the phases of a trial.
+
+    Args:
+        time_s: shape (n,), strictly increasing, s.
+        length: shape (n,), length (not its change) in any unit; noise and rounded corners are allowed.
+        amplitude_l0: the amplitude of the conditioning stretch where it is known, L0. A stretch too small to be seen
+            in the record is then placed by the protocol, counting back from the test stretch at the same speed.
+        recovery_s: the time between shortening and test stretch where it is known, s. A pause too short to be seen
+            in the record then gets this duration around the corner in which it hides.
+
+    Returns:
+        Phases in order of time, touching each other, from the first sample to the last. Onsets of stretches are
+        good to about a sample at 1 kHz, because they are where fitted lines meet.
+    """
+    pieces = straight_pieces(np.asarray(time_s, dtype=np.float64), np.asarray(length, dtype=np.float64))
+    ramps = tuple(piece.direction for piece in pieces if piece.direction)
+    if ramps == _CONDITIONED and all(piece.direction for piece in _between(pieces)):
+        return _named(_with_pause(pieces, recovery_s), _CONDITIONED_NAMES)
+    if ramps == _CONDITIONED and len(_between(pieces)) == 2 and _between(pieces)[1].direction == 0:
+        return _named(pieces, _CONDITIONED_NAMES)
+    if amplitude_l0 and recovery_s and ramps and ramps[-1] > 0 and pieces[0].direction == 0:
+        placed = _placed_by_protocol(pieces, amplitude_l0, recovery_s)
+        if placed is not None:
+            return _named(placed, _CONDITIONED_NAMES)
+    if ramps == _REFERENCE:
+        return _named(pieces, ("test_stretch",))
+    names = {1: "stretch", 0: "isometric", -1: "shortening"}
+    return tuple(Phase(names[piece.direction], piece.start_s, piece.end_s) for piece in pieces)
+
+
+def initial_isometric(time_s: Array, phases: tuple[Phase, ...]) -> slice:
+    """Samples of the isometric phase that begins a trial, without its last fifth (smoothing leaks the stretch into it).
+
+    Returns:
+        A slice of ``time_s``; empty where the trial does not begin isometrically.
+    """
+    if not phases or phases[0].name != "isometric":
+        return slice(0, 0)
+    first = phases[0]
+    end_s = first.end_s if len(phases) == 1 else first.start_s + 0.8 * (first.end_s - first.start_s)
+    return slice(0, int(np.searchsorted(time_s, end_s, side="right")))
+
+
+def _between(pieces: list[Piece]) -> list[Piece]:
+    """Pieces after the conditioning stretch and before the test stretch."""
+    ramps = [i for i, piece in enumerate(pieces) if piece.direction]
+    return pieces[ramps[0] + 1 : ramps[-1]]
+
+
+def _with_pause(pieces: list[Piece], recovery_s: float | None) -> list[Piece]:
+    """Put a pause of known duration around the corner between shortening and test stretch.
+
+    Lines of equal and opposite slope that stop at a level and leave it again meet in the middle of the pause.
+    """
+    if not recovery_s:
+        return pieces
+    i = next(i for i, piece in enumerate(pieces) if piece.direction < 0)
+    down, up = pieces[i], pieces[i + 1]
+    half = min(0.5 * recovery_s, 0.9 * (down.end_s - down.start_s), 0.9 * (up.end_s - up.start_s))
+    start_s, end_s = down.end_s - half, down.end_s + half
+    level = down.line[0] * start_s + down.line[1]
+    pause = Piece(0, start_s, end_s, (0.0, level))
+    return [*pieces[:i], down._replace(end_s=start_s), pause, up._replace(start_s=end_s), *pieces[i + 2 :]]
+
+
+def _placed_by_protocol(pieces: list[Piece], amplitude_l0: float, recovery_s: float) -> list[Piece] | None:
+    """The protocol's pieces counted back from the test stretch; None where the record begins too late for them."""
+    i = max(i for i, piece in enumerate(pieces) if piece.direction)
+    test, first = pieces[i], pieces[0]
+    ramp_s = amplitude_l0 * first.line[1] / test.line[0]
+    down_end_s = test.start_s - recovery_s
+    peak_s = down_end_s - ramp_s
+    onset_s = peak_s - ramp_s
+    if onset_s <= first.start_s:
+        return None
+    slope = test.line[0]
+    return [
+        first._replace(end_s=onset_s),
+        Piece(1, onset_s, peak_s, (slope, first.line[1] - slope * onset_s)),
+        Piece(-1, peak_s, down_end_s, (-slope, first.line[1] + slope * down_end_s)),
+        Piece(0, down_end_s, test.start_s, first.line),
+        *pieces[i:],
+    ]
+
+
+def _named(pieces: list[Piece], ramp_names: tuple[str, ...]) -> tuple[Phase, ...]:
+    names = iter(ramp_names)
+    phases = []
+    done = 0
+    for piece in pieces:
+        if piece.direction:
+            name = next(names)
+            done += 1
+        else:
+            name = "isometric" if done == 0 else "hold" if done == len(ramp_names) else "recovery"
+        phases.append(Phase(name, piece.start_s, piece.end_s))
+    return tuple(phases)

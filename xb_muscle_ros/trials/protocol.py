@@ -1,0 +1,100 @@
+"""The stretch-shorten-stretch protocol of van der Zee et al. 2026 (data of Horslen et al. 2023)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.trial import Array, Phase, Trial, TrialFacts
+
+SPEED_L0_PER_S = 0.4545
+TEST_STRETCH_L0 = 0.0383
+TEST_DURATION_S = TEST_STRETCH_L0 / SPEED_L0_PER_S
+
+
+@dataclass(frozen=True)
+class StretchShortenStretch:
+    """Isometric, conditioning stretch, shortening back, recovery, test stretch, hold.
+
+    Attributes:
+        amplitude_l0: of the conditioning stretch, L0; 0 leaves stretch and shortening out (the reference trial).
+        recovery_s: isometric time before the test stretch, s.
+        lead_s: isometric time before the conditioning stretch, s.
+        hold_s: isometric time after the test stretch, s.
+        speed_l0_per_s: of all length changes.
+        test_stretch_l0: amplitude of the test stretch, L0.
+
+    Raises:
+        UserError: a duration or amplitude is negative, or the speed is not positive.
+    """
+
+    amplitude_l0: float
+    recovery_s: float
+    lead_s: float = 0.1
+    hold_s: float = 0.1
+    speed_l0_per_s: float = SPEED_L0_PER_S
+    test_stretch_l0: float = TEST_STRETCH_L0
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            least_open = name == "speed_l0_per_s"
+            if not np.isfinite(value) or value < 0.0 or (least_open and value == 0.0):
+                raise UserError(
+                    f"protocol: {name} is {value:g}; allowed is any number {'above' if least_open else 'from'} 0"
+                )
+
+    @property
+    def phases(self) -> tuple[Phase, ...]:
+        """All phases of non-zero duration, in order of time."""
+        ramp = self.amplitude_l0 / self.speed_l0_per_s
+        durations = (
+            ("isometric", self.lead_s),
+            ("conditioning_stretch", ramp),
+            ("shortening", ramp),
+            ("recovery", self.recovery_s),
+            ("test_stretch", self.test_stretch_l0 / self.speed_l0_per_s),
+            ("hold", self.hold_s),
+        )
+        phases, start = [], 0.0
+        for name, duration in durations:
+            if duration > 0.0:
+                phases.append(Phase(name, start, start + duration))
+                start += duration
+        return tuple(phases)
+
+    def corners(self) -> tuple[Array, Array]:
+        """Times (s) and length changes (L0) of the corners; length is linear between them."""
+        rise = {
+            "conditioning_stretch": self.amplitude_l0,
+            "shortening": -self.amplitude_l0,
+            "test_stretch": self.test_stretch_l0,
+        }
+        times, lengths = [0.0], [0.0]
+        for phase in self.phases:
+            times.append(phase.end_s)
+            lengths.append(lengths[-1] + rise.get(phase.name, 0.0))
+        return np.array(times), np.array(lengths)
+
+    def trial(self, fibre: str, pca: float, rate_hz: float = 1000.0, name: str = "") -> Trial:
+        """The protocol as a trial without measured force, in normalised units (1 m is one L0)."""
+        corner_s, corner_l0 = self.corners()
+        count = int(np.floor(corner_s[-1] * rate_hz * (1.0 + 1e-12))) + 1
+        # On whole nanoseconds, as a bag will hold them: a trial and its bag give the same simulation.
+        time_s = np.round(np.arange(count) / rate_hz * 1e9) / 1e9
+        facts = TrialFacts(
+            fibre=fibre,
+            trial=name or f"amp{self.amplitude_l0 * 1e4:.0f}_rt{self.recovery_s * 1e3:g}ms_pca{pca * 10:.0f}",
+            pca=pca,
+            amplitude_l0=self.amplitude_l0,
+            recovery_s=self.recovery_s,
+            phases=self.phases,
+        )
+        return Trial(
+            facts=facts,
+            time_s=time_s,
+            length_m=1.0 + np.interp(time_s, corner_s, corner_l0),
+            calcium_time_s=np.zeros(1),
+            calcium_um=np.array([10.0 ** (6.0 - pca)]),
+        )

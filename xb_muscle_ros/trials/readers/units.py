@@ -1,0 +1,92 @@
+"""Units a recording may come in, and what they are in the units of a trial."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import NamedTuple
+
+from xb_muscle_ros.errors import UserError, suggest
+
+
+class Unit(NamedTuple):
+    """A unit: what it measures and how many of the kind's base unit it is (s, m, L0, N, Pa, F0, µM)."""
+
+    kind: str
+    factor: float
+
+
+class Quantity(NamedTuple):
+    """A number with its unit, converted: ``value`` is in the base unit of ``kind``."""
+
+    value: float
+    kind: str
+
+
+UNITS = {
+    "s": Unit("time", 1.0),
+    "ms": Unit("time", 1e-3),
+    "us": Unit("time", 1e-6),
+    "m": Unit("length", 1.0),
+    "cm": Unit("length", 1e-2),
+    "mm": Unit("length", 1e-3),
+    "um": Unit("length", 1e-6),
+    "nm": Unit("length", 1e-9),
+    "L0": Unit("relative length", 1.0),
+    "%L0": Unit("relative length", 1e-2),
+    "N": Unit("force", 1.0),
+    "mN": Unit("force", 1e-3),
+    "uN": Unit("force", 1e-6),
+    "nN": Unit("force", 1e-9),
+    "Pa": Unit("stress", 1.0),
+    "kPa": Unit("stress", 1e3),
+    "MPa": Unit("stress", 1e6),
+    "mN/mm2": Unit("stress", 1e3),
+    "N/cm2": Unit("stress", 1e4),
+    "F0": Unit("relative force", 1.0),
+    "%F0": Unit("relative force", 1e-2),
+    "M": Unit("calcium", 1e6),
+    "mM": Unit("calcium", 1e3),
+    "uM": Unit("calcium", 1.0),
+    "nM": Unit("calcium", 1e-3),
+    # A logarithm, hence no factor: whoever converts it has to know.
+    "pCa": Unit("pCa", math.nan),
+}
+KINDS = {
+    "time": ("time",),
+    "length": ("length", "relative length"),
+    "force": ("force", "stress", "relative force"),
+    "calcium": ("calcium", "pCa"),
+}
+
+
+def unit_of(text: str, column: str, where: str) -> Unit:
+    """The unit named ``text`` for a column of ``time``, ``length``, ``force`` or ``calcium``.
+
+    Raises:
+        UserError: unknown unit, or one of something else.
+    """
+    name = text.replace("µ", "u").replace("μ", "u").replace("²", "2")
+    allowed = [known for known, unit in UNITS.items() if unit.kind in KINDS[column]]
+    if name not in UNITS:
+        raise UserError(f"{where}: unit '{text}' of {column} is not known{suggest(name, allowed)}")
+    if name not in allowed:
+        raise UserError(f"{where}: '{text}' is no unit of {column}; allowed: {', '.join(allowed)}")
+    return UNITS[name]
+
+
+def quantity(text: str, column: str, what: str, where: str) -> Quantity:
+    """A quantity such as ``42.8 mm``, above zero, in a unit that fits the column.
+
+    Raises:
+        UserError: no number above zero with a fitting unit.
+    """
+    match = re.fullmatch(r"\s*(\S+)\s+(\S+)\s*", text)
+    try:
+        value = float(match.group(1)) if match else math.nan
+    except ValueError:
+        value = math.nan
+    if match is None or not (math.isfinite(value) and value > 0.0):
+        raise UserError(f"{where}: {what} is '{text}'; needed is a number above 0 and its unit, for example '42.8 mm'")
+    unit = unit_of(match.group(2), column, f"{where}: {what}")
+    return Quantity(value * unit.factor, unit.kind)
