@@ -107,7 +107,7 @@ def test_bench_writes_its_figures(tmp_path: Path, capsys: pytest.CaptureFixture[
     out = tmp_path / "bench.json"
     assert main(["bench", "--study", "rhs", "--out", str(out)]) == 0
     figures = json.loads(out.read_text())["figures"]
-    assert any("right-hand side, 3state_coop, smooth" == f["name"] for f in figures)
+    assert any(f["name"] == "right-hand side, 3state_coop, smooth" for f in figures)
     assert all(set(f) == {"name", "value", "unit", "spread", "compared_with"} for f in figures)
     assert all(f["value"] > 0.0 for f in figures)
 

@@ -114,9 +114,11 @@ def test_any_parameters_either_make_a_fibre_or_a_user_error(parameters: dict[str
     try:
         fibre = fibre_from_parameters(parameters, "test")
     except UserError as error:
-        assert "\n" not in str(error)
+        lines = str(error).count("\n")
     else:
+        lines = 0
         assert fibre.model in fibre.available_models
+    assert lines == 0
 
 
 def test_every_row_of_the_table_is_complete() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import importlib.util
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,11 +46,15 @@ def demo(recordings: Path | None, out: Path, live: bool) -> int:
     offline = replay(trials, fibre)
     print(f"\n{offline.table}")
     through_node = None
-    if live:
-        from xb_muscle_ros.node.process import running_node
+    if live and importlib.util.find_spec("rclpy") is None:
+        print("\nROS 2 is not installed here (rclpy): the part through muscle_node is left out")
+    elif live:
+        from xb_muscle_ros.node.player import play_live
+        from xb_muscle_ros.node.process import NodeProcess, private_domain
 
-        with running_node(find_fibre_file(FIBRE), "lockstep"):
-            through_node = replay(trials, fibre, live=True)
+        domain = private_domain()
+        with NodeProcess(domain, {"fiber_file": find_fibre_file(FIBRE), "mode": "lockstep"}):
+            through_node = replay(trials, fibre, functools.partial(play_live, domain_id=domain, find_s=30.0))
         print(f"\n{through_node.table}")
         write_results(out / "live", trials, through_node)
         same = all(

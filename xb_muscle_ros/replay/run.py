@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +14,10 @@ from xb_muscle_ros.replay.report import Record, add_relative_stiffness, record, 
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.simulated import Simulated
 from xb_muscle_ros.trials.trial import Trial
+
+
+Player = Callable[[Sequence[Trial], Fibre], Sequence[Simulated]]
+"""Plays trials through a running node: `node.player.play_live`, or that with its options filled in."""
 
 
 @dataclass(frozen=True)
@@ -36,14 +40,18 @@ class Replay:
 
 
 def replay(
-    trials: Sequence[Trial], fibre: Fibre, live: bool = False, substeps: int = 1, settle_s: float | None = None
+    trials: Sequence[Trial],
+    fibre: Fibre,
+    live: Player | None = None,
+    substeps: int = 1,
+    settle_s: float | None = None,
 ) -> Replay:
     """Replay trials.
 
     Args:
         trials: at least one, names unique.
         fibre: parameters.
-        live: through a running ``muscle_node`` in lockstep instead of offline.
+        live: plays the trials through a running node; None replays offline.
         substeps, settle_s: see `simulate_trial`; offline only.
 
     Raises:
@@ -56,19 +64,16 @@ def replay(
         raise UserError(
             f"trial name {repeated[0]} comes {names.count(repeated[0])} times; replay its bags in separate runs"
         )
-    if live:
-        # The only place offline tools touch ROS, and only when asked to.
-        from xb_muscle_ros.node.player import play_live
-
-        simulated = tuple(play_live(trials, fibre))
+    if live is not None:
+        simulated = tuple(live(trials, fibre))
     else:
         muscle = Muscle(fibre)
         simulated = tuple(simulate_trial(muscle, trial, substeps, settle_s) for trial in trials)
     records = [record(trial, one, fibre) for trial, one in zip(trials, simulated, strict=True)]
     add_relative_stiffness(records)
-    how = "live, through muscle_node" if live else "offline"
+    how = "live, through muscle_node" if live is not None else "offline"
     title = f"fibre {fibre.name}, model {fibre.model}, method {fibre.method} ({how})"
-    return Replay(fibre, live, simulated, tuple(records), table(records, title))
+    return Replay(fibre, live is not None, simulated, tuple(records), table(records, title))
 
 
 def write_results(folder: Path, trials: Sequence[Trial], results: Replay, live: Replay | None = None) -> list[Path]:
