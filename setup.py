@@ -41,7 +41,7 @@ setup(
         "sympy>=1.12",
         "tqdm>=4.64",
         "mcap>=1.1",
-        "rosbags>=0.11",
+        "rosbags>=0.11.9,<0.12",
         "lz4>=4.0",
         "zstandard>=0.20",
     ],

@@ -61,6 +61,8 @@ def test_round_trip_is_bit_exact(made: Trial) -> None:
         path = Path(folder) / "bag"
         write_trial(path, made)
         read = read_trial(path)
+        (path / "metadata.yaml").unlink()
+        assert read_trial(path).facts == made.facts  # from the copy in the file
     assert read.facts == made.facts
     assert read.warnings == ()
     for name in ("time_s", "length_m", "calcium_time_s", "calcium_um", "force_time_s", "force_n"):
@@ -174,6 +176,18 @@ def test_a_trial_that_no_bag_can_hold_is_refused(
     for word in ["bag", *words]:
         assert word in str(refused.value)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "text", ["a'\"b  " * 40, "\u00e9  \U00010000\\ud800\"' " * 20, " - : # {x} [y] & * ! | > % @ `", "yes", "1_0"]
+)
+def test_long_and_odd_text_survives(tmp_path: Path, trial: Trial, text: str) -> None:
+    phases = (Phase(text, 0.0, 0.004),)
+    facts = dataclasses.replace(trial.facts, source=text, trial=text, phases=phases)
+    write_trial(tmp_path / "bag", dataclasses.replace(trial, facts=facts))
+    assert read_trial(tmp_path / "bag").facts == facts
+    (tmp_path / "bag" / "metadata.yaml").unlink()
+    assert read_trial(tmp_path / "bag").facts == facts
 
 
 def test_text_of_more_than_a_line_is_refused(tmp_path: Path, trial: Trial) -> None:

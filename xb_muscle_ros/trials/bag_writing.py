@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from rosbags.rosbag2 import StoragePlugin, Writer
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bag_files import check_replaceable
+from xb_muscle_ros.trials.bag_writer import BagWriter
 from xb_muscle_ros.trials.custom_data import facts_to_custom_data
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
 from xb_muscle_ros.trials.trial import Array, Trial
@@ -66,14 +66,7 @@ def write_trial(path: Path, trial: Trial, simulated: Simulated | None = None) ->
 
 
 def _write(folder: Path, name: str, series: list[_Series], custom_data: dict[str, str]) -> None:
-    writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
-    with writer:
-        storage = writer.storage
-        assert storage is not None  # an open writer has one
-        # rosbag2 numbers the files of a bag; the metadata take their name from the storage.
-        storage.path = storage.path.rename(folder / f"{name}_0.mcap")
-        for key, value in custom_data.items():
-            writer.set_custom_data(key, value)
+    with BagWriter(folder, name, custom_data) as writer:
         connections = [
             writer.add_connection(
                 each.topic,
