@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
-from xb_muscle_ros.mechanisms.base import GaussianSpread, Quantities, State, StrainRate
+from xb_muscle_ros.mechanisms.base import GaussianSpread, Parameter, Quantities, State, StrainRate
 from xb_muscle_ros.mechanisms.ops import Expr
+
+if TYPE_CHECKING:
+    from xb_muscle_ros.models.composition import Composition
 
 
 class Moments(NamedTuple):
@@ -21,14 +25,64 @@ class Moments(NamedTuple):
         return Moments(self.m0 + sign * other.m0, self.m1 + sign * other.m1, self.m2 + sign * other.m2)
 
 
-ZERO = Moments(0, 0, 0)
+class Ways(NamedTuple):
+    """The ways heads come and go, in terms of strain.
+
+    Attributes:
+        attach: of ready heads.
+        detach: to the ready state.
+        tear: to the forcibly detached state.
+        reattach: back from it.
+    """
+
+    attach: GaussianSpread
+    detach: tuple[StrainRate, ...]
+    tear: tuple[StrainRate, ...]
+    reattach: tuple[GaussianSpread, ...]
 
 
-class MomentRepresentation(ABC):
-    """A distribution that is known by its moments alone."""
+class Fluxes(NamedTuple):
+    """What the ways amount to, in heads per second.
+
+    Attributes:
+        kinetics: moments of all that comes less all that goes, at constant strain.
+        torn_off: heads that go to the forcibly detached state.
+        reattached: heads that come back from it.
+    """
+
+    kinetics: Moments
+    torn_off: Expr
+    reattached: Expr
+
+
+class Representation(ABC):
+    """A way to carry the distribution of attached heads over strain.
+
+    Attributes:
+        name: as in the registry.
+        parameters: rows of the parameter table that belong to the method.
+        states: of a fixed number of states; a grid's bins are not among them.
+    """
 
     name: ClassVar[str]
-    states: ClassVar[tuple[State, ...]]
+    parameters: ClassVar[tuple[Parameter, ...]] = ()
+    states: ClassVar[tuple[State, ...]] = ()
+
+    @abstractmethod
+    def fluxes(self, q: Quantities, ways: Ways) -> Fluxes:
+        """Heads per second by the ways of the model."""
+
+    @abstractmethod
+    def module_text(self, model: Composition, smooth: bool) -> str:
+        """Text of the module that steps a model: see `models.codegen`."""
+
+    def state_rows(self, model: Composition, values: Mapping[str, float]) -> tuple[State, ...]:
+        """The integrated states of a model with these parameter values, in order."""
+        return model.states
+
+
+class MomentRepresentation(Representation):
+    """A distribution that is known by its moments alone."""
 
     @abstractmethod
     def outflow(self, q: Quantities, rate: StrainRate) -> Moments:
@@ -37,3 +91,21 @@ class MomentRepresentation(ABC):
     def inflow(self, spread: GaussianSpread) -> Moments:
         """Moments of heads that attach, normally distributed around strain 0."""
         return Moments(spread.rate, 0, spread.rate * spread.width**2)
+
+    def fluxes(self, q: Quantities, ways: Ways) -> Fluxes:
+        """Sums of the ways' moments."""
+        torn = back = Moments(0, 0, 0)
+        for rate in ways.tear:
+            torn = torn.plus(self.outflow(q, rate))
+        for spread in ways.reattach:
+            back = back.plus(self.inflow(spread))
+        kinetics = self.inflow(ways.attach).plus(torn, -1).plus(back)
+        for rate in ways.detach:
+            kinetics = kinetics.plus(self.outflow(q, rate), -1)
+        return Fluxes(kinetics, torn.m0, back.m0)
+
+    def module_text(self, model: Composition, smooth: bool) -> str:
+        """Everything is an expression of the states: one flat right-hand side."""
+        from xb_muscle_ros.models.codegen import flat_module
+
+        return flat_module(model, smooth)

@@ -39,17 +39,24 @@ def module_text(model: Composition, smooth: bool) -> str:
         model: the composition.
         smooth: with the released sets' smooth functions, or exact.
     """
+    return model.representation.module_text(model, smooth)
+
+
+def header(model: Composition, smooth: bool, order: int) -> str:
+    """Head of a generated module: imports, and the constants that the loops of `stepping.kernels` use."""
+    head = _HEADER.format(name=model.name, smooth=" with smooth functions" if smooth else "")
+    codes = "OK, NOT_FINITE, OUT_OF_BOUNDS, TOO_MANY_STEPS = 0, 1, 2, 3\nMAX_ATTEMPTS = 20000\n"
+    return f"{head}\n\n{codes}EXPONENT = {1.0 / order!r}\nORDER = {order}\nOUTPUTS = {OUTPUTS!r}\n"
+
+
+def flat_module(model: Composition, smooth: bool) -> str:
+    """A model whose every state is a symbol: one flat right-hand side, one flat Rosenbrock step."""
     e = equations(model, smooth)
-    n = len(e.states)
-    header = _HEADER.format(name=model.name, smooth=" with smooth functions" if smooth else "")
-    sizes = (
-        f"N_STATES, N_VECTOR = {n}, {n + len(INPUTS)}\nLENGTH, VELOCITY, CALCIUM = {n}, {n + 1}, {n + 2}\n"
-        "OK, NOT_FINITE, OUT_OF_BOUNDS, TOO_MANY_STEPS = 0, 1, 2, 3\nMAX_ATTEMPTS = 20000\n"
-        f"STATES = {tuple(s.name for s in e.states)!r}\nOUTPUTS = {OUTPUTS!r}\n"
-    )
-    parts = [header, sizes, _rhs(e), _attempt(e), _slope(e), _vector("rest", e, e.rest), _outputs(e)]
-    parts.append(_violation(e, smooth))
-    return "\n\n".join(parts) + "\n\n\n" + _kernels() + "\n"
+    prepare = function("prepare(p)", "Parameters and what is computed from them once: nothing here.", ["return p.copy()"])
+    stay = function("regrid(s, p, work)", "Moments need no grid.", ["pass"])
+    parts = [header(model, smooth, rodas3.ORDER), prepare, stay, _rhs(e), _attempt(e), _slope(e)]
+    parts += [vector("rest", e, e.rest), _outputs(e), _violation(e, smooth)]
+    return "\n\n".join(parts) + "\n\n\n" + kernels() + "\n"
 
 
 def c_text(model: Composition, smooth: bool) -> str:
@@ -74,21 +81,25 @@ def _scalars(e: Equations, source: str, c_style: bool = False) -> list[str]:
     return [*lines, f"{kind}shift = {source}[{len(e.states)}]{end}"]
 
 
-def _function(head: str, doc: str, lines: Iterable[str]) -> str:
+def function(head: str, doc: str, lines: Iterable[str]) -> str:
+    """Text of a compiled function."""
     body = "\n".join(f"    {line}" for line in lines)
     return f'{_JIT}\ndef {head}:\n    """{doc}"""\n{body}\n'
 
 
-def _assignments(body: Program) -> list[str]:
+def assignments(body: Program) -> list[str]:
+    """Lines of a program."""
     return [f"{symbol} = {python(expression)}" for symbol, expression in body.lines]
 
 
-def _parameters(e: Equations, used: Iterable[Any]) -> list[str]:
+def parameter_loads(e: Equations, used: Iterable[Any]) -> list[str]:
+    """Lines that load the parameters among some symbols."""
     names = {str(s) for s in used}
     return [f"{p.name} = p[{i}]" for i, p in enumerate(e.parameters) if p.name in names]
 
 
-def _used(*programs: Program) -> set[Any]:
+def used_symbols(*programs: Program) -> set[Any]:
+    """All symbols of some programs."""
     found: set[Any] = set()
     for body in programs:
         for _, expression in body.lines:
@@ -102,13 +113,13 @@ def _rhs(e: Equations) -> str:
     """Rates of change in the fixed frame, scalars in and a tuple out: nothing touches memory."""
     body = program(e.derivatives[:-1], "t")
     names = ", ".join([*(s.name for s in e.states), "shift"])
-    lines = [*_parameters(e, _used(body)), *_assignments(body)]
+    lines = [*parameter_loads(e, used_symbols(body)), *assignments(body)]
     lines.append(f"return ({', '.join(python(r) for r in body.results)},)")
-    text = _function(f"rates({names}, velocity, calcium, p)", "Rates of the states and of the shift.", lines)
+    text = function(f"rates({names}, velocity, calcium, p)", "Rates of the states and of the shift.", lines)
     loads = [f"z[{i}]" for i in range(len(e.states) + 1)]
     call = [f"r = rates({', '.join(loads)}, velocity, calcium, p)"]
     call += [f"out[{i}] = r[{i}]" for i in range(len(e.states) + 1)]
-    return text + "\n\n" + _function("rhs(z, velocity, calcium, p, out)", "The same on arrays; z ends in shift.", call)
+    return text + "\n\n" + function("rhs(z, velocity, calcium, p, out)", "The same on arrays; z ends in shift.", call)
 
 
 def _attempt(e: Equations) -> str:
@@ -123,7 +134,7 @@ def _attempt(e: Equations) -> str:
     first, entries = flat.results[:n], flat.results[n:]
     solver = Elimination([[entries[i * n + j] != 0 for j in range(n)] for i in range(n)])
     lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
-    lines += [*_parameters(e, _used(flat)), *_assignments(flat)]
+    lines += [*parameter_loads(e, used_symbols(flat)), *assignments(flat)]
     lines += ["per_h = 1.0 / h", f"diagonal = per_h * {1.0 / rodas3.GAMMA!r}"]
     for i, j in solver.entries():
         entry = entries[i * n + j]
@@ -151,7 +162,7 @@ def _attempt(e: Equations) -> str:
     lines += [f"y_{i} = {_sum([names[i] if i < n - 1 else '0.0'], rodas3.M, i)}" for i in range(n)]
     swap = {symbol: sympy.Symbol(f"y_{i}", real=True) for i, symbol in enumerate(variables)}
     arrival = program([x.subs(swap, simultaneous=True) for x in e.arrival], "m")
-    lines += _assignments(arrival)
+    lines += assignments(arrival)
     lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(arrival.results)]
     # Relative for large moments, absolute otherwise: forces and fractions are of order one.
     lines += ["error = 0.0"]
@@ -159,7 +170,7 @@ def _attempt(e: Equations) -> str:
         lines.append(f"error = max(error, abs(e_{i}) / (1.0 + abs(y_{i})))")
     lines += ["return error if error == error else math.inf"]
     doc = "One Rosenbrock step of h seconds; returns the largest embedded error."
-    return _function("attempt(s, h, velocity, calcium, p, out)", doc, lines)
+    return function("attempt(s, h, velocity, calcium, p, out, work)", doc, lines)
 
 
 def _sum(start: list[str], weights: Iterable[float], i: int) -> str:
@@ -183,9 +194,9 @@ def _slope(e: Equations) -> str:
         moving.append(sympy.sympify(total).subs(e.shift, 0))
     body = program(moving, "t")
     lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
-    lines += [*_parameters(e, _used(body)), *_assignments(body)]
+    lines += [*parameter_loads(e, used_symbols(body)), *assignments(body)]
     lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
-    return _function("slope(s, velocity, calcium, p, out)", "Rates of change of the integrated states.", lines)
+    return function("slope(s, velocity, calcium, p, out)", "Rates of change of the integrated states.", lines)
 
 
 def _outputs(e: Equations) -> str:
@@ -193,16 +204,17 @@ def _outputs(e: Equations) -> str:
     n = len(e.states)
     lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
     lines += [f"{s.name} = s[{n + i}]" for i, s in enumerate(INPUTS)]
-    lines += [*_parameters(e, _used(body)), *_assignments(body)]
+    lines += [*parameter_loads(e, used_symbols(body)), *assignments(body)]
     lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
-    return _function("outputs(s, p, out)", "Forces, contractile element and states, as named in OUTPUTS.", lines)
+    return function("outputs(s, p, out)", "Forces, contractile element and states, as named in OUTPUTS.", lines)
 
 
-def _vector(name: str, e: Equations, expressions: Iterable[Any]) -> str:
+def vector(name: str, e: Equations, expressions: Iterable[Any]) -> str:
+    """Text of a function of the parameters that fills a vector."""
     body = program(list(expressions), "t")
-    lines = [*_parameters(e, _used(body)), *_assignments(body)]
+    lines = [*parameter_loads(e, used_symbols(body)), *assignments(body)]
     lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
-    return _function(f"{name}(p, out)", "State of a fibre at rest without calcium.", lines)
+    return function(f"{name}(p, out)", "State of a fibre at rest without calcium.", lines)
 
 
 def _violation(e: Equations, smooth: bool) -> str:
@@ -214,10 +226,10 @@ def _violation(e: Equations, smooth: bool) -> str:
         # Written so that a NaN fails the comparison.
         lines += [f"room = {room}", f"if not ({s.lower!r} - room <= s[{i}] <= {s.upper!r} + room):", f"    return {i}"]
     doc = "First state out of bounds by more than slack, else -1."
-    return _function("violation(s, p, slack)", doc, [*lines, "return -1"])
+    return function("violation(s, p, slack)", doc, [*lines, "return -1"])
 
 
-def _kernels() -> str:
+def kernels() -> str:
     """The loops of `stepping.kernels`, decorated."""
     from xb_muscle_ros.stepping import kernels
 

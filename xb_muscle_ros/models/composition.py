@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from xb_muscle_ros.distribution.base import ZERO, MomentRepresentation, Moments
+from xb_muscle_ros.distribution.base import Moments, Representation, Ways
 from xb_muscle_ros.mechanisms.base import (
     Attachment,
     Detachment,
@@ -58,7 +58,7 @@ class Composition:
     detachment: Detachment
     series: Series
     parallel: Parallel
-    representation: MomentRepresentation
+    representation: Representation
 
     @property
     def blocks(self) -> tuple[Mechanism, ...]:
@@ -76,7 +76,8 @@ class Composition:
     def parameters(self) -> tuple[Parameter, ...]:
         """Rows of the parameter table that this model needs, without repeats."""
         rows: dict[str, Parameter] = {}
-        for row in (*(p for block in self.blocks for p in block.parameters), *COMMON):
+        blocks = (p for block in self.blocks for p in block.parameters)
+        for row in (*blocks, *COMMON, *self.representation.parameters):
             rows.setdefault(row.name, row)
         return tuple(rows.values())
 
@@ -164,22 +165,19 @@ def _rates(model: Composition, q: Quantities) -> tuple[Moments, dict[str, Expr],
     q = q.for_block(thin.name, forcibly_detached=detach.forcibly_detached(q))
     q = q.for_block(thick.name, available_sites=thin.available_sites(q))
     q = q.for_block(model.attachment.name, ready_heads=thick.ready_heads(q))
-    represent = model.representation
-    kinetics = represent.inflow(model.attachment.spread(q))
-    for rate in detach.rates(q.for_block(detach.name)):
-        kinetics = kinetics.plus(represent.outflow(q, rate), -1)
-    torn = ZERO
-    for rate in detach.forcible_rates(q.for_block(detach.name)):
-        torn = torn.plus(represent.outflow(q, rate))
-    back = ZERO
-    for spread in detach.reattachment(q.for_block(detach.name)):
-        back = back.plus(represent.inflow(spread))
-    kinetics = kinetics.plus(torn, -1).plus(back)
+    of_detachment = q.for_block(detach.name)
+    ways = Ways(
+        attach=model.attachment.spread(q),
+        detach=detach.rates(of_detachment),
+        tear=detach.forcible_rates(of_detachment),
+        reattach=detach.reattachment(of_detachment),
+    )
+    kinetics, torn, back = model.representation.fluxes(q, ways)
     others: dict[str, Expr] = {}
-    others.update(detach.derivatives(q.for_block(detach.name, torn_off=torn.m0, reattached=back.m0)))
+    others.update(detach.derivatives(q.for_block(detach.name, torn_off=torn, reattached=back)))
     others.update(thin.derivatives(q.for_block(thin.name)))
     # Heads between attached and torn off stay out of the thick filament's balance: dQ0 + dR.
-    net = kinetics.m0 + torn.m0 - back.m0
+    net = kinetics.m0 + torn - back
     others.update(thick.derivatives(q.for_block(thick.name, attachment_rate_net=net)))
     stiffness = sympy.sympify(q.q0)
     force_rate = kinetics.m0 + kinetics.m1

@@ -17,6 +17,8 @@ Array = npt.NDArray[np.float64]
 
 # The fixed stepper's guard: an embedded error of 1e-4 is 0.02 % of F0; smooth input at 1 ms stays 100 times below it.
 GUARD = 1e-4
+# Rows of scratch: four for the loops, eight for a model's step.
+_SCRATCH_ROWS = 12
 _SETTLE_TOLERANCE = 1e-8
 _SETTLED_RATE = 1e-9
 _LONGEST_SETTLING_S = 1e6
@@ -70,14 +72,14 @@ class Muscle:
         """
         self.fibre = fibre
         model = model_of_set(fibre.model)
-        rows = compose(model, fibre.method).parameters
-        self.parameters: Array = np.array([fibre.values[row.name] for row in rows])
-        self.parameters.setflags(write=False)
+        composition = compose(model, fibre.method)
         self.code: Any = compiled(model, fibre.method, fibre.values["smoothing"] > 0.0)
-        self.state_names: tuple[str, ...] = (*self.code.STATES, "length_change", "velocity", "calcium")
-        self._bounds = {s.name: (s.lower, s.upper) for s in compose(model, fibre.method).states}
-        self._n = int(self.code.N_VECTOR)
-        self._work = np.zeros((4, self._n))
+        self.parameters: Array = self.code.prepare(np.array([fibre.values[row.name] for row in composition.parameters]))
+        self.parameters.setflags(write=False)
+        self._states = composition.representation.state_rows(composition, fibre.values)
+        self.state_names: tuple[str, ...] = (*(s.name for s in self._states), "length_change", "velocity", "calcium")
+        self._n = len(self.state_names)
+        self._work = np.zeros((_SCRATCH_ROWS, self._n))
         self._out = np.zeros(len(Outputs._fields))
         # One short step now, so that the first real one finds everything compiled.
         self.outputs(self.step(self.rest(), 0.0, 0.1, 1e-6))
@@ -86,7 +88,7 @@ class Muscle:
         """State of a fibre at rest without calcium, at a length change in L0."""
         state = np.zeros(self._n)
         self.code.rest(self.parameters, state)
-        state[self.code.LENGTH] = length_change_l0
+        state[-3] = length_change_l0
         return state
 
     def settle(self, length_change_l0: float, calcium_um: float, duration_s: float | None = None) -> Array:
@@ -105,7 +107,7 @@ class Muscle:
         state = self.rest(length_change_l0)
         if duration_s is not None:
             return self._advance(state, length_change_l0, calcium_um, duration_s, 1e-6, _SETTLE_TOLERANCE)
-        rates = np.zeros(int(self.code.N_STATES))
+        rates = np.zeros(self._n - 3)
         chunk, total = 1.0, 0.0
         while total < _LONGEST_SETTLING_S:
             state = self._advance(state, length_change_l0, calcium_um, chunk, 1e-6, _SETTLE_TOLERANCE)
@@ -141,7 +143,15 @@ class Muscle:
         self.code.outputs_of(states, self.parameters, table)
         return {name: table[:, i].copy() for i, name in enumerate(Outputs._fields)}
 
-    def run(self, state: Array, dt_s: Array, length_change_l0: Array, calcium_um: Array, substeps: int = 1) -> Array:
+    def run(
+        self,
+        state: Array,
+        dt_s: Array,
+        length_change_l0: Array,
+        calcium_um: Array,
+        substeps: int = 1,
+        every: int = 1,
+    ) -> Array:
         """States at every sample, shape (n, state): the result of `step` from sample to sample, bit for bit.
 
         Args:
@@ -150,17 +160,18 @@ class Muscle:
             length_change_l0: shape (n,), L0.
             calcium_um: shape (n,), µM; the k-th acts in the step that ends at the k-th sample.
             substeps: steps between two samples.
+            every: stride of the samples whose states are returned, the first included.
 
         Raises:
             StateViolation: see `step`; the time counts from the first sample.
         """
-        states = np.zeros((length_change_l0.size, self._n))
+        states = np.zeros(((length_change_l0.size - 1) // every + 1, self._n))
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (dt_s, length_change_l0, calcium_um)]
         code, fault, k, within, _ = self.code.run(
-            state, *arrays, self.parameters, 0.0, GUARD, substeps, states, self._work
+            state, *arrays, self.parameters, 0.0, GUARD, substeps, every, states, self._work
         )
         if code != 0:
-            self._raise(code, fault, float(arrays[0][: k - 1].sum() + within), states[k])
+            self._raise(code, fault, float(arrays[0][: k - 1].sum() + within), states[-1])
         return states
 
     def follow(
@@ -205,7 +216,7 @@ class Muscle:
         if fault < 0:
             raise UserError(f"fibre {self.fibre.name}: integration stopped at t = {time_s:.6g} s; {result.value}")
         name = self.state_names[fault]
-        lower, upper = self._bounds[name]
+        lower, upper = self._states[fault].lower, self._states[fault].upper
         raise StateViolation(
             self.fibre.name, name, time_s, float(state[fault]), f"{lower:g} to {upper:g}", result.value
         )

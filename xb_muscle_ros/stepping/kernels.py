@@ -1,9 +1,10 @@
 """Loops around one Rosenbrock step. Their text is compiled anew beside each model's own step: see `models.codegen`.
 
-Nothing here knows a model: `attempt`, `slope`, `violation` and the sizes stand for those of the generated module. All
+Nothing here knows a model: `attempt`, `regrid`, `slope`, `outputs` and `violation` stand for those of the generated module. All
 functions are pure: they read the state they are given and write to `out` and `work` only.
 
-A state vector holds the integrated states, then length change (L0), velocity (L0/s) and calcium (µM).
+A state vector holds the integrated states, then length change (L0), velocity (L0/s) and calcium (µM). Of the scratch
+`work`, rows 0 to 3 belong to these loops, the others to the model.
 """
 
 from __future__ import annotations
@@ -16,18 +17,15 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-N_STATES = 0
-N_VECTOR = 0
-LENGTH = 0
-VELOCITY = 0
-CALCIUM = 0
-
 OK, NOT_FINITE, OUT_OF_BOUNDS, TOO_MANY_STEPS = 0, 1, 2, 3
 MAX_ATTEMPTS = 20000
+# One over the order of the method: how the step size follows the error.
+EXPONENT = 1.0 / 3.0
 
-
-# One Rosenbrock step of h seconds into `out`; returns the largest embedded error: (s, h, velocity, calcium, p, out).
-attempt: Callable[[Array, float, float, float, Array, Array], float]
+# One step of h seconds into `out`; returns the largest embedded error: (s, h, velocity, calcium, p, out, work).
+attempt: Callable[[Array, float, float, float, Array, Array, Array], float]
+# After an accepted step: bring a strain grid back to where heads attach; moments need nothing: (s, p, work).
+regrid: Callable[[Array, Array, Array], None]
 # Rates of change of the integrated states: (s, velocity, calcium, p, out).
 slope: Callable[[Array, float, float, Array, Array], None]
 # Forces, contractile element and states: (s, p, out).
@@ -47,7 +45,7 @@ def advance(
     the last call it is the variable one.
 
     Args:
-        s: state vector, shape (N_VECTOR,).
+        s: state vector, shape (n,).
         length_end: length change at the end, L0; it moves linearly from the state's own.
         calcium: free calcium, µM, held.
         dt: duration, s.
@@ -55,15 +53,16 @@ def advance(
         h: first step to try, s.
         tol: largest embedded error of a step, in units of the states.
         out: receives the new state vector; on failure the offending one.
-        work: scratch, shape (2, N_VECTOR).
+        work: scratch, shape (12, n).
 
     Returns:
         (code, index of the state at fault or -1, time reached in s, next step to try in s, steps taken, steps tried)
     """
-    velocity = (length_end - s[LENGTH]) / dt
+    n = s.shape[0]
+    velocity = (length_end - s[n - 3]) / dt
     here = work[0]
     trial = work[1]
-    for i in range(N_VECTOR):
+    for i in range(n):
         here[i] = s[i]
     t = 0.0
     h = min(h, dt)
@@ -82,62 +81,65 @@ def advance(
         # Stretch the last step rather than leave a sliver behind.
         if h > rest * 0.999999:
             h = rest
-        error = attempt(here, h, velocity, calcium, p, trial)
+        error = attempt(here, h, velocity, calcium, p, trial, work)
         fault = violation(trial, p, slack)
         if fault < 0 and error <= tol:
             taken += 1
             t = dt if h == rest else t + h
-            for i in range(N_STATES):
+            for i in range(n - 3):
                 here[i] = trial[i]
-            factor = 5.0 if error <= 0.0 else min(5.0, 0.9 * (tol / error) ** (1.0 / 3.0))
+            regrid(here, p, work)
+            factor = 5.0 if error <= 0.0 else min(5.0, 0.9 * (tol / error) ** EXPONENT)
             grown = h * max(factor, 0.2)
             # A step cut short by the end of the interval says little about the next one.
             next_h = max(grown, next_h) if h == rest else grown
             h = grown
         else:
-            smaller = 0.25 if fault >= 0 or not error < 1e300 else max(0.1, 0.9 * (tol / error) ** (1.0 / 3.0))
+            smaller = 0.25 if fault >= 0 or not error < 1e300 else max(0.1, 0.9 * (tol / error) ** EXPONENT)
             h = h * min(smaller, 0.7)
             next_h = h
             if h < 1e-12 * dt or h < 1e-15:
                 code = OUT_OF_BOUNDS if fault >= 0 and np.isfinite(trial[fault]) else NOT_FINITE
-                for i in range(N_STATES):
+                for i in range(n - 3):
                     here[i] = trial[i]
                 break
-    for i in range(N_STATES):
+    for i in range(n - 3):
         out[i] = here[i]
-    out[LENGTH] = length_end
-    out[VELOCITY] = velocity
-    out[CALCIUM] = calcium
+    out[n - 3] = length_end
+    out[n - 2] = velocity
+    out[n - 1] = calcium
     return code, fault, t, next_h, taken, tried
 
 
 def run(
     s: Array, dt_s: Array, length: Array, calcium: Array, p: Array, max_h: float, tol: float, substeps: int,
-    out: Array, work: Array,
+    every: int, out: Array, work: Array,
 ) -> Any:  # fmt: skip
-    """Follow samples of length and calcium; `out[k]` is the state at sample k, `out[0]` is `s`.
+    """Follow samples of length and calcium; `out[k]` is the state at sample k * every, `out[0]` is `s`.
 
     Args:
         s: state at the first sample.
-        dt_s: shape (n - 1,), time from each sample to the next, s.
-        length, calcium: shape (n,), L0, µM; calcium[k] acts in the step that ends at sample k.
+        dt_s: shape (samples - 1,), time from each sample to the next, s.
+        length, calcium: shape (samples,), L0, µM; calcium[k] acts in the step that ends at sample k.
         max_h: 0 for the fixed stepper, else the variable one with this longest step, s.
         substeps: steps of the fixed stepper between two samples.
-        out: receives states, shape (n, N_VECTOR).
-        work: scratch, shape (4, N_VECTOR).
+        every: stride of the samples to keep.
+        out: receives states, shape ((samples - 1) // every + 1, n); on failure its last row is the offending one.
+        work: scratch, shape (12, n).
 
     Returns:
         (code, index of the state at fault, index of the sample reached, time within the step in s, steps tried)
     """
     here = work[2]
     there = work[3]
-    n = length.shape[0]
-    for i in range(N_VECTOR):
+    n = s.shape[0]
+    samples = length.shape[0]
+    for i in range(n):
         here[i] = s[i]
         out[0, i] = s[i]
     steps = 0
     h = max_h
-    for k in range(1, n):
+    for k in range(1, samples):
         dt = dt_s[k - 1] / substeps
         start = length[k - 1]
         rise = length[k] - start
@@ -147,15 +149,16 @@ def run(
                 here, end, calcium[k], dt, p, dt if max_h <= 0.0 else min(h, max_h), tol, there, work
             )
             steps += tried
-            for i in range(N_VECTOR):
+            for i in range(n):
                 here[i] = there[i]
             if code != OK:
-                for i in range(N_VECTOR):
-                    out[k, i] = here[i]
+                for i in range(n):
+                    out[out.shape[0] - 1, i] = here[i]
                 return code, fault, k, j * dt + t, steps
-        for i in range(N_VECTOR):
-            out[k, i] = here[i]
-    return OK, -1, n - 1, 0.0, steps
+        if k % every == 0:
+            for i in range(n):
+                out[k // every, i] = here[i]
+    return OK, -1, samples - 1, 0.0, steps
 
 
 def follow(
@@ -168,24 +171,25 @@ def follow(
         s: state at corner[0].
         corner, length, calcium: shape (m,), s, L0, µM; length is linear between corners, calcium[k] acts up to
             corner k.
-        sample: ascending times within the corners, s, shape (n,).
+        sample: ascending times within the corners, s, shape (samples,).
         first_h: step to try first, s; it is carried over the corners, where the error control finds the new one.
-        out: receives states at the samples, shape (n, N_VECTOR).
-        work: scratch, shape (4, N_VECTOR).
+        out: receives states at the samples, shape (samples, n).
+        work: scratch, shape (12, n).
 
     Returns:
         (code, index of the state at fault, time reached in s, steps tried, steps taken)
     """
+    n = s.shape[0]
     here = work[0]
     there = work[1]
     before = work[2]
     after = work[3]
-    for i in range(N_VECTOR):
+    for i in range(n):
         here[i] = s[i]
-    n = sample.shape[0]
+    samples = sample.shape[0]
     next_sample = 0
-    while next_sample < n and sample[next_sample] <= corner[0]:
-        for i in range(N_VECTOR):
+    while next_sample < samples and sample[next_sample] <= corner[0]:
+        for i in range(n):
             out[next_sample, i] = here[i]
         next_sample += 1
     slack = max(10.0 * tol, 1e-9)
@@ -198,7 +202,6 @@ def follow(
         velocity = (length[k] - length[k - 1]) / dt
         t = 0.0
         in_interval = 0
-        fresh = True
         while t < dt:
             rest = dt - t
             wanted = h
@@ -210,27 +213,26 @@ def follow(
                 return TOO_MANY_STEPS, -1, begin + t, tried, taken
             in_interval += 1
             tried += 1
-            error = attempt(here, h, velocity, calcium[k], p, there)
+            error = attempt(here, h, velocity, calcium[k], p, there, work)
             fault = violation(there, p, slack)
             if fault >= 0 or not error <= tol:
-                smaller = 0.25 if fault >= 0 or not error < 1e300 else max(0.1, 0.9 * (tol / error) ** (1.0 / 3.0))
+                smaller = 0.25 if fault >= 0 or not error < 1e300 else max(0.1, 0.9 * (tol / error) ** EXPONENT)
                 h = h * min(smaller, 0.7)
                 if h < 1e-15 or h < 1e-12 * dt:
-                    for i in range(N_STATES):
-                        out[min(next_sample, n - 1), i] = there[i]
+                    for i in range(n - 3):
+                        out[min(next_sample, samples - 1), i] = there[i]
                     code = OUT_OF_BOUNDS if fault >= 0 and np.isfinite(there[fault]) else NOT_FINITE
                     return code, fault, begin + t, tried, taken
                 continue
             taken += 1
             end = dt if h == rest else t + h
             at_corner = end == dt
-            if next_sample < n and (
+            if next_sample < samples and (
                 sample[next_sample] < begin + end or (at_corner and sample[next_sample] <= corner[k])
             ):
-                if fresh:
-                    slope(here, velocity, calcium[k], p, before)
+                slope(here, velocity, calcium[k], p, before)
                 slope(there, velocity, calcium[k], p, after)
-                while next_sample < n and (
+                while next_sample < samples and (
                     sample[next_sample] < begin + end or (at_corner and sample[next_sample] <= corner[k])
                 ):
                     x = (sample[next_sample] - begin - t) / h
@@ -238,21 +240,17 @@ def follow(
                     b = x * (1.0 - x) * (1.0 - x) * h
                     c = x * x * (3.0 - 2.0 * x)
                     d = x * x * (x - 1.0) * h
-                    for i in range(N_STATES):
+                    for i in range(n - 3):
                         out[next_sample, i] = a * here[i] + b * before[i] + c * there[i] + d * after[i]
-                    out[next_sample, LENGTH] = length[k - 1] + velocity * (t + x * h)
-                    out[next_sample, VELOCITY] = velocity
-                    out[next_sample, CALCIUM] = calcium[k]
+                    out[next_sample, n - 3] = length[k - 1] + velocity * (t + x * h)
+                    out[next_sample, n - 2] = velocity
+                    out[next_sample, n - 1] = calcium[k]
                     next_sample += 1
-                for i in range(N_STATES):
-                    before[i] = after[i]
-                fresh = False
-            else:
-                fresh = True
-            for i in range(N_STATES):
+            for i in range(n - 3):
                 here[i] = there[i]
+            regrid(here, p, work)
             t = end
-            grown = h * (5.0 if error <= 0.0 else min(5.0, max(0.2, 0.9 * (tol / error) ** (1.0 / 3.0))))
+            grown = h * (5.0 if error <= 0.0 else min(5.0, max(0.2, 0.9 * (tol / error) ** EXPONENT)))
             # A step cut short by the corner says little about the next one.
             h = max(grown, wanted) if at_corner else grown
     return OK, -1, corner[corner.shape[0] - 1], tried, taken
