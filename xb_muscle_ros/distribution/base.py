@@ -55,6 +55,18 @@ class Fluxes(NamedTuple):
     reattached: Expr
 
 
+class Settling(NamedTuple):
+    """How a fibre is brought to rest isometrically with the method's own steps.
+
+    Attributes:
+        rate: at rest, no state changes faster than this, 1/s.
+        step_s: fixed step, s; None: variable steps of any size.
+    """
+
+    rate: float
+    step_s: float | None
+
+
 class Representation(ABC):
     """A way to carry the distribution of attached heads over strain.
 
@@ -62,11 +74,13 @@ class Representation(ABC):
         name: as in the registry.
         parameters: rows of the parameter table that belong to the method.
         states: of a fixed number of states; a grid's bins are not among them.
+        settling: see `Settling`.
     """
 
     name: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     states: ClassVar[tuple[State, ...]] = ()
+    settling: ClassVar[Settling] = Settling(rate=1e-9, step_s=None)
 
     @abstractmethod
     def fluxes(self, q: Quantities, ways: Ways) -> Fluxes:

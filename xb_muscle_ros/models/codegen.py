@@ -231,14 +231,14 @@ def _violation(e: Equations, smooth: bool) -> str:
 
 def kernels() -> str:
     """The loops of `stepping.kernels`, decorated."""
-    from xb_muscle_ros.stepping import kernels
+    from xb_muscle_ros.stepping import kernels as loops
 
-    text = Path(kernels.__file__).read_text(encoding="utf-8").split("# BEGIN COMPILED\n", 1)[1]
-    text = (
-        text.replace(": Array", "")
-        .replace(" -> Any", "")
-        .replace(" -> None", "")
-        .replace(": float", "")
-        .replace(": int", "")
-    )
-    return text.replace("\ndef ", f"\n{_JIT}\ndef ").replace("def advance", f"{_JIT}\ndef advance", 1)
+    return compiled_text(Path(loops.__file__))
+
+
+def compiled_text(path: Path) -> str:
+    """Functions of a module of kernels, without their types and with Numba's decorator."""
+    text = path.read_text(encoding="utf-8").split("# BEGIN COMPILED\n", 1)[1]
+    for types in (": Array", ": float", ": int", ": Any", " -> Any", " -> None", " -> float", " -> int"):
+        text = text.replace(types, "")
+    return f"\n{text}".replace("\ndef ", f"\n{_JIT}\ndef ").strip()

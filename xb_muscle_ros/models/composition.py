@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from xb_muscle_ros.distribution.base import Moments, Representation, Ways
 from xb_muscle_ros.mechanisms.base import (
@@ -128,10 +128,11 @@ def equations(model: Composition, smooth: bool) -> Equations:
     fixed = Moments(symbols["q0"], symbols["q1"], symbols["q2"])
     moved = _moved(fixed, shift)
     values = {**symbols, "q0": moved.m0, "q1": moved.m1, "q2": moved.m2}
-    kinetics, others, q = _rates(model, Quantities(values, "composition", symbols["smoothing"] if smooth else None))
+    parts = rates(model, Quantities(values, "composition", symbols["smoothing"] if smooth else None))
     # In the frame fixed at the start of the step a head's strain is x - shift, whatever the velocity.
-    in_fixed = _moved(kinetics, -shift)
-    derivatives = [*in_fixed, *(others[s.name] for s in model.states[3:]), q.ce_velocity, symbols["velocity"]]
+    in_fixed = _moved(parts.kinetics, -shift)
+    others = [parts.others[s.name] for s in model.states[3:]]
+    derivatives = [*in_fixed, *others, parts.q.ce_velocity, symbols["velocity"]]
     rest_q = Quantities(symbols, "composition", None)
     rest = [0, 0, 0]
     for block in model.blocks:
@@ -144,7 +145,7 @@ def equations(model: Composition, smooth: bool) -> Equations:
         derivatives=tuple(sympy.sympify(e) for e in derivatives),
         arrival=tuple(sympy.sympify(e) for e in (*moved, *(symbols[s.name] for s in model.states[3:]))),
         rest=tuple(sympy.sympify(e) for e in rest),
-        outputs=tuple(sympy.sympify(e).subs(shift, 0) for e in _outputs(model, q)),
+        outputs=tuple(sympy.sympify(e).subs(shift, 0) for e in output_expressions(model, parts.q)),
     )
 
 
@@ -153,8 +154,24 @@ def _moved(m: Moments, shift: Expr) -> Moments:
     return Moments(m.m0, m.m1 + shift * m.m0, m.m2 + 2 * shift * m.m1 + shift**2 * m.m0)
 
 
-def _rates(model: Composition, q: Quantities) -> tuple[Moments, dict[str, Expr], Quantities]:
-    """Kinetics of the moments at constant strain, rates of the other states, and all quantities on the way.
+class Parts(NamedTuple):
+    """What `rates` puts together.
+
+    Attributes:
+        kinetics: moments of the heads per second that come and go, at constant strain.
+        others: rates of change of the blocks' own states, by name.
+        ways: how heads come and go, in terms of strain.
+        q: all quantities, ``ce_velocity`` among them.
+    """
+
+    kinetics: Moments
+    others: Mapping[str, Expr]
+    ways: Ways
+    q: Quantities
+
+
+def rates(model: Composition, q: Quantities) -> Parts:
+    """Put the blocks together, from moments and states to rates of change and velocity.
 
     The order is fixed by who needs what: force and sites before heads, heads before fluxes, fluxes before velocity.
     """
@@ -183,10 +200,10 @@ def _rates(model: Composition, q: Quantities) -> tuple[Moments, dict[str, Expr],
     force_rate = kinetics.m0 + kinetics.m1
     q = q.for_block(model.series.name, kinetic_force_rate=force_rate, stiffness_xb=stiffness)
     q = q.for_block("composition", ce_velocity=model.series.ce_velocity(q))
-    return kinetics, others, q
+    return Parts(kinetics, others, ways, q)
 
 
-def _outputs(model: Composition, q: Quantities) -> list[Expr]:
+def output_expressions(model: Composition, q: Quantities) -> list[Expr]:
     """Expressions of `OUTPUTS`."""
     extension = model.series.extension(q.for_block(model.series.name))
     force_pe = model.parallel.force(q.for_block(model.parallel.name))

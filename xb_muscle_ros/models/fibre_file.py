@@ -157,7 +157,7 @@ def fibre_from_parameters(
     how = method or text.get("method", "gaussian")
     if how not in METHODS:
         raise UserError(f"{where}: method '{how}' is not known{suggest(how, METHODS)}")
-    values = complete(sets[chosen], model_of_set(chosen), f"{where}, model {chosen}")
+    values = complete(sets[chosen], model_of_set(chosen), f"{where}, model {chosen}", how)
     for name, number in constants.items():
         if number is None:
             raise UserError(f"{where}: constant '{name}' is missing")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,10 +18,9 @@ Array = npt.NDArray[np.float64]
 
 # The fixed stepper's guard: an embedded error of 1e-4 is 0.02 % of F0; smooth input at 1 ms stays 100 times below it.
 GUARD = 1e-4
-# Rows of scratch: four for the loops, eight for a model's step.
-_SCRATCH_ROWS = 12
+# Rows of scratch: four for the loops, the others for a model's step.
+_SCRATCH_ROWS = 13
 _SETTLE_TOLERANCE = 1e-8
-_SETTLED_RATE = 1e-9
 _LONGEST_SETTLING_S = 1e6
 
 
@@ -76,6 +76,7 @@ class Muscle:
         self.code: Any = compiled(model, fibre.method, fibre.values["smoothing"] > 0.0)
         self.parameters: Array = self.code.prepare(np.array([fibre.values[row.name] for row in composition.parameters]))
         self.parameters.setflags(write=False)
+        self._settling = composition.representation.settling
         self._states = composition.representation.state_rows(composition, fibre.values)
         self.state_names: tuple[str, ...] = (*(s.name for s in self._states), "length_change", "velocity", "calcium")
         self._n = len(self.state_names)
@@ -97,8 +98,8 @@ class Muscle:
         Args:
             length_change_l0: length change relative to rest, L0.
             calcium_um: free calcium, µM.
-            duration_s: how long; None: until no state changes by more than 1e-9 1/s, which takes minutes of muscle
-                time at low calcium and milliseconds of computing.
+            duration_s: how long; None: until no state changes by more than 1e-9 1/s (1e-6 on a strain grid), which
+                takes minutes of muscle time at low calcium and milliseconds of computing (seconds on a large grid).
 
         Raises:
             UserError: the fibre does not come to rest at this calcium.
@@ -106,16 +107,18 @@ class Muscle:
         """
         state = self.rest(length_change_l0)
         if duration_s is not None:
-            return self._advance(state, length_change_l0, calcium_um, duration_s, 1e-6, _SETTLE_TOLERANCE)
+            return self._isometric(state, calcium_um, duration_s)
         rates = np.zeros(self._n - 3)
         chunk, total = 1.0, 0.0
-        while total < _LONGEST_SETTLING_S:
-            state = self._advance(state, length_change_l0, calcium_um, chunk, 1e-6, _SETTLE_TOLERANCE)
+        # Fixed steps cost time by the second of muscle time, variable ones hardly any.
+        longest, end = (_LONGEST_SETTLING_S, _LONGEST_SETTLING_S) if self._settling.step_s is None else (4.0, 1000.0)
+        while total < end:
+            state = self._isometric(state, calcium_um, chunk)
             total += chunk
             self.code.slope(state, 0.0, calcium_um, self.parameters, rates)
-            if np.max(np.abs(rates)) < _SETTLED_RATE:
+            if np.max(np.abs(rates)) < self._settling.rate:
                 return state
-            chunk *= 2.0
+            chunk = min(2.0 * chunk, longest)
         raise UserError(
             f"fibre {self.fibre.name}, model {self.fibre.model}: not at rest after {total:.3g} s at {calcium_um:g} µM "
             f"calcium (fastest state still changes by {np.max(np.abs(rates)):.3g} 1/s); give a settling time instead"
@@ -201,6 +204,18 @@ class Muscle:
         if code != 0:
             self._raise(code, fault, t, self._work[1])
         return states
+
+    def _isometric(self, state: Array, calcium: float, duration_s: float) -> Array:
+        """State after some time at its own length."""
+        length = float(state[-3])
+        step_s = self._settling.step_s
+        if step_s is None:
+            return self._advance(state, length, calcium, duration_s, 1e-6, _SETTLE_TOLERANCE)
+        count = max(1, math.ceil(duration_s / step_s - 1e-9))
+        dt = np.full(count, duration_s / count)
+        held = np.full(count + 1, calcium)
+        after: Array = self.run(state, dt, np.full(count + 1, length), held, every=count)[-1]
+        return after
 
     def _advance(self, state: Array, length: float, calcium: float, dt: float, h: float, tolerance: float) -> Array:
         out = np.empty(self._n)

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.mechanisms.base import Parameter
-from xb_muscle_ros.models.registry import MODELS, compose
+from xb_muscle_ros.models.registry import METHODS, MODELS, compose
 
 CONSTANTS: Mapping[str, Parameter] = MappingProxyType(
     {
@@ -28,6 +28,9 @@ def _gather() -> Mapping[str, Parameter]:
     rows: dict[str, Parameter] = {}
     for model in MODELS:
         for row in compose(model).parameters:
+            rows.setdefault(row.name, row)
+    for method in METHODS.values():
+        for row in method.parameters:
             rows.setdefault(row.name, row)
     return MappingProxyType(rows)
 
@@ -59,15 +62,16 @@ def checked(name: str, value: object, table: Mapping[str, Parameter], where: str
     return number
 
 
-def complete(values: Mapping[str, float], model: str, where: str) -> dict[str, float]:
-    """Values of all parameters a model needs, defaults filled in.
+def complete(values: Mapping[str, float], model: str, where: str, method: str = "gaussian") -> dict[str, float]:
+    """Values of all parameters a model and a method need, defaults filled in; those of other methods are left out.
 
     Raises:
         UserError: a parameter without a default is missing, or one is given that the model does not have.
     """
-    needed = {row.name: row for row in compose(model).parameters}
+    needed = {row.name: row for row in compose(model, method).parameters}
+    of_methods = {row.name for other in METHODS.values() for row in other.parameters}
     for name in values:
-        if name not in needed:
+        if name not in needed and name not in of_methods:
             raise UserError(f"{where}: model {model} has no parameter '{name}'{suggest(name, needed)}")
     full: dict[str, float] = {}
     for name, row in needed.items():

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from xb_muscle_ros.distribution.base import MomentRepresentation
+from xb_muscle_ros.distribution.base import Representation
 from xb_muscle_ros.distribution.gaussian import Gaussian
+from xb_muscle_ros.distribution.grid import Characteristics, ConservativeFixedGrid, FixedGrid
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.mechanisms.attachment.gaussian import GaussianAttachment
 from xb_muscle_ros.mechanisms.base import Attachment, Detachment, Parallel, Series, ThickFilament, ThinFilament
@@ -36,7 +37,9 @@ MODELS: Mapping[str, Row] = {
     "2state_coop": Row(CooperativeThinFilament, AlwaysOnThickFilament),
     "3state_coop": Row(CooperativeThinFilament, ForceDependentThickFilament),
 }
-METHODS: Mapping[str, type[MomentRepresentation]] = {"gaussian": Gaussian}
+METHODS: Mapping[str, type[Representation]] = {
+    method.name: method for method in (Gaussian, Characteristics, FixedGrid, ConservativeFixedGrid)
+}
 
 
 def model_of_set(name: str, where: str = "") -> str:

@@ -1,0 +1,75 @@
+"""The scalar part of a model on a strain grid: everything but the sums over bins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import sympy
+
+from xb_muscle_ros.distribution.base import Ways
+from xb_muscle_ros.mechanisms.base import ExponentialRate, Parameter, Quantities, State, StrainRate
+from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.models.composition import INPUTS, Composition, output_expressions, rates
+
+SUMS = ("q0", "q1", "q2", "kin0", "kin1", "torn_off", "reattached")
+
+
+@dataclass(frozen=True)
+class GridEquations:
+    """A model on a grid, written out in symbols.
+
+    Attributes:
+        states: those beside the bins.
+        parameters: in the order of the parameter vector.
+        symbols: of states, inputs, parameters and `SUMS`, by name.
+        ways: how heads come and go.
+        derivatives: of the states, then of the shift, from states, inputs and sums.
+        rest: states of a fibre at rest.
+        outputs: as in `composition.OUTPUTS`.
+    """
+
+    states: tuple[State, ...]
+    parameters: tuple[Parameter, ...]
+    symbols: Mapping[str, Any]
+    ways: Ways
+    derivatives: tuple[Expr, ...]
+    rest: tuple[Expr, ...]
+    outputs: tuple[Expr, ...]
+
+    @property
+    def leaving(self) -> tuple[tuple[StrainRate, bool], ...]:
+        """All rates at which heads leave, with whether they are torn off."""
+        return (*((rate, False) for rate in self.ways.detach), *((rate, True) for rate in self.ways.tear))
+
+
+def grid_equations(model: Composition, smooth: bool) -> GridEquations:
+    """Write a composition on a grid out.
+
+    Raises:
+        AttributeError: a block asks for a quantity that no block provides.
+        ValueError: a strain dependence whose shape changes with the state, which a grid's tables cannot follow.
+    """
+    names = [*(s.name for s in model.states), *(i.name for i in INPUTS), *(p.name for p in model.parameters), *SUMS]
+    symbols = {name: sympy.Symbol(name, real=True) for name in names}
+    q = Quantities(symbols, "composition", symbols["smoothing"] if smooth else None)
+    parts = rates(model, q)
+    fixed = {symbols[p.name] for p in model.parameters}
+    for rate in (*parts.ways.detach, *parts.ways.tear):
+        shape = (rate.slope,) if isinstance(rate, ExponentialRate) else (rate.threshold, rate.steepness)
+        for expression in shape:
+            if sympy.sympify(expression).free_symbols - fixed:
+                raise ValueError(f"model {model.name}: strain dependence {expression} must depend on parameters alone")
+    rest_q = Quantities(symbols, "composition", None)
+    rest = [block.rest(rest_q.for_block(block.name))[s.name] for block in model.blocks for s in block.states]
+    derivatives = [*(parts.others[s.name] for s in model.states), parts.q.ce_velocity]
+    return GridEquations(
+        states=model.states,
+        parameters=model.parameters,
+        symbols=symbols,
+        ways=parts.ways,
+        derivatives=tuple(sympy.sympify(e) for e in derivatives),
+        rest=tuple(sympy.sympify(e) for e in rest),
+        outputs=tuple(sympy.sympify(e) for e in output_expressions(model, parts.q)),
+    )
