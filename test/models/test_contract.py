@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from xb_muscle_ros.errors import StateViolation
 from xb_muscle_ros.models.fibre_file import Fibre, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.registry import METHODS, MODELS, model_of_set
@@ -29,12 +30,18 @@ def fibre_for(model: str, method: str, smoothing: float) -> Fibre:
         from xb_muscle_ros.models.registry import compose
 
         names = {row.name for row in compose(model, method).parameters}
-        values = complete({k: v for k, v in full.values.items() if k in names}, model, "test")
+        values = complete({k: v for k, v in full.values.items() if k in names}, model, "test", method)
     values["smoothing"] = smoothing
     return Fibre(**{**full.__dict__, "model": model, "method": method, "values": MappingProxyType(values)})
 
 
-@pytest.fixture(scope="module", params=[(m, k, s) for m in MODELS for k in METHODS for s in (0.0, 100.0)], ids=str)
+# Every model with every method; the smooth functions of the released sets with the method they were released for.
+CASES = [(m, k, s) for m in MODELS for k in METHODS for s in ((0.0, 100.0) if k == "gaussian" else (0.0,))]
+# These carry heads along exactly; the others smear them a little with every step, so that smaller steps are no remedy.
+EXACT_MOVEMENT = ("gaussian", "characteristics")
+
+
+@pytest.fixture(scope="module", params=CASES, ids=str)
 def muscle(request: pytest.FixtureRequest) -> Muscle:
     return Muscle(fibre_for(*request.param))
 
@@ -47,8 +54,10 @@ def test_names_of_states_and_parameters_agree_with_the_registry(muscle: Muscle) 
     from xb_muscle_ros.models.registry import compose
 
     composition = compose(model_of_set(muscle.fibre.model), muscle.fibre.method)
-    assert muscle.state_names == (*(s.name for s in composition.states), "length_change", "velocity", "calcium")
-    assert [muscle.fibre.values[p.name] for p in composition.parameters] == muscle.parameters.tolist()
+    states = composition.representation.state_rows(composition, muscle.fibre.values)
+    assert muscle.state_names == (*(s.name for s in states), "length_change", "velocity", "calcium")
+    rows = composition.parameters
+    assert [muscle.fibre.values[p.name] for p in rows] == muscle.parameters[: len(rows)].tolist()
 
 
 @pytest.mark.parametrize("pca", PCAS)
@@ -56,7 +65,7 @@ def test_settles_where_nothing_changes_any_more(muscle: Muscle, pca: float) -> N
     state = muscle.settle(0.0, calcium(pca))
     later = muscle.step(state, 0.0, calcium(pca), 1.0)
     n = len(muscle.state_names) - 3
-    np.testing.assert_allclose(later[:n], state[:n], atol=2e-7)
+    np.testing.assert_allclose(later[:n], state[:n], atol=2e-7 if muscle.fibre.method == "gaussian" else 2e-5)
 
 
 @pytest.mark.parametrize("pca", PCAS)
@@ -108,36 +117,108 @@ def test_both_elements_bear_the_same_force(muscle: Muscle) -> None:
 
 @pytest.mark.parametrize("pca", PCAS)
 @pytest.mark.parametrize("dt", [1e-3, 5e-4])
-def test_fixed_steps_up_to_1_ms_agree_with_the_variable_stepper(muscle: Muscle, pca: float, dt: float) -> None:
-    corner = np.array([0.0, 0.02, 0.1, 0.18, 0.2])
-    length = np.array([0.0, 0.0, 0.036, 0.0, 0.0])
+def test_fixed_steps_up_to_1_ms_are_accurate(muscle: Muscle, pca: float, dt: float) -> None:
+    """Against 32 times smaller steps over the same samples: the bar of the paper for 1e-4 s is 0.01 % F0."""
+    if muscle.fibre.method not in EXACT_MOVEMENT:
+        return
     time = np.arange(round(0.2 / dt) + 1) * dt
+    length = np.interp(time, [0.0, 0.02, 0.1, 0.18, 0.2], [0.0, 0.0, 0.036, 0.0, 0.0])
     start = muscle.settle(0.0, calcium(pca))
-    fixed = muscle.run(start, np.diff(time), np.interp(time, corner, length), np.full(time.size, calcium(pca)))
-    exact = muscle.follow(start, corner, length, np.full(5, calcium(pca)), np.minimum(time, 0.2), 1e-9)
-    force = [muscle.outputs_of(states)["force_f0"] for states in (fixed, exact)]
-    # The bar of the paper for its Gaussian form at 1e-4 s is 0.01 % F0; here steps are ten times longer.
-    assert np.abs(force[0] - force[1]).max() < 1e-4
+    held = np.full(time.size, calcium(pca))
+    coarse, fine = (muscle.run(start, np.diff(time), length, held, n) for n in (1, 32))
+    force = [muscle.outputs_of(states)["force_f0"] for states in (coarse, fine)]
+    assert np.abs(force[0] - force[1]).max() < (1e-4 if muscle.code.ORDER == 3 else 3e-4)
 
 
-def test_order_of_convergence_is_three(muscle: Muscle) -> None:
-    """Halving the step divides the error by eight: slope of log error on log step, by regression."""
+@pytest.mark.parametrize("pca", PCAS)
+def test_variable_steps_land_where_fixed_steps_do(muscle: Muscle, pca: float) -> None:
+    if muscle.fibre.method not in EXACT_MOVEMENT:
+        return
+    corner, length = np.array([0.0, 0.02, 0.1, 0.18, 0.2]), np.array([0.0, 0.0, 0.036, 0.0, 0.0])
+    time = np.linspace(0.0, 0.2, 201)
+    start = muscle.settle(0.0, calcium(pca))
+    held = np.full(time.size, calcium(pca))
+    fixed = muscle.run(start, np.diff(time), np.interp(time, corner, length), held, 32)
+    variable = muscle.follow(start, corner, length, held[:5], time, 1e-6 if muscle.code.ORDER == 3 else 1e-7)
+    force = [muscle.outputs_of(states)["force_f0"] for states in (fixed, variable)]
+    assert np.abs(force[0] - force[1]).max() < 2e-5
+
+
+def test_order_of_convergence(muscle: Muscle) -> None:
+    """Slope of log error on log step, by regression: 3 for the moments' stepper, 2 for the grids'."""
+    if muscle.fibre.method not in EXACT_MOVEMENT:
+        return
     start = muscle.settle(0.0, 2.0)
     errors, steps = [], []
-    n = len(muscle.state_names) - 3
     end = 0.016
 
     def after(count: int) -> np.ndarray:
         time = np.linspace(0.0, end, count + 1)
         states = muscle.run(start, np.diff(time), 0.45 * time, np.full(count + 1, 3.0))
-        return np.asarray(states[-1, :n])
+        out = muscle.outputs(states[-1])
+        return np.array([out.q0, out.q1, out.n_on, out.drx])
 
     exact = after(4096)
     for count in (32, 64, 128, 256):
         errors.append(np.abs(after(count) - exact).max())
         steps.append(end / count)
     slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
-    assert 2.7 < slope < 3.4
+    assert muscle.code.ORDER - 0.3 < slope < muscle.code.ORDER + 0.4
+
+
+def test_order_of_convergence_of_interpolation_on_fixed_grids(muscle: Muscle) -> None:
+    """With bins halved, the linear remap's error halves at least; the conservative one's falls by four and more."""
+    if muscle.fibre.method in EXACT_MOVEMENT or muscle.fibre.model != "3state_coop":
+        return
+    time = np.arange(101) * 1e-3
+    length, held = 0.45 * time, np.full(101, 1.0)
+
+    def force(method: str, bins: float) -> np.ndarray:
+        fibre = fibre_for("3state_coop", method, 0.0)
+        one = Muscle(Fibre(**{**fibre.__dict__, "values": {**fibre.values, "bins": bins}}))
+        states = one.run(one.settle(0.0, 1.0), np.diff(time), length, held)
+        return one.outputs_of(states)["force_f0"]
+
+    exact = force("characteristics", 1001.0)
+    errors = [np.abs(force(muscle.fibre.method, bins) - exact).max() for bins in (251.0, 501.0, 1001.0)]
+    factor = 1.5 if muscle.fibre.method == "fixed_grid" else 4.0
+    assert errors[0] > factor * errors[1] > factor**2 * errors[2]
+
+
+@pytest.mark.parametrize("pca", PCAS)
+def test_gaussian_and_distribution_agree_for_slow_changes(muscle: Muscle, pca: float) -> None:
+    if muscle.fibre.method != "characteristics":
+        return
+    gaussian = Muscle(fibre_for(muscle.fibre.model, "gaussian", 0.0))
+    time = np.arange(401) * 1e-3
+    length, held = 0.01 * time, np.full(401, calcium(pca))
+    force = []
+    for one in (muscle, gaussian):
+        states = one.run(one.settle(0.0, calcium(pca)), np.diff(time), length, held)
+        force.append(one.outputs_of(states)["force_f0"])
+    assert np.abs(force[0] - force[1]).max() < 0.01
+
+
+def test_large_movements_never_leave_the_grid(muscle: Muscle) -> None:
+    """Half a fibre length either way is 65 power strokes, four times the grid's half width."""
+    if muscle.fibre.method == "gaussian":
+        return
+    time = np.arange(1001) * 2e-3
+    length = 0.3 * np.sin(np.pi * time)
+    states = muscle.run(muscle.settle(0.0, 3.0), np.diff(time), length, np.full(1001, 3.0), every=10)
+    assert np.abs(states[:, muscle.state_names.index("grid_shift")]).max() < 0.1
+    assert np.isfinite(muscle.outputs_of(states)["force_f0"]).all()
+
+
+def test_a_grid_that_may_not_follow_says_when_it_is_left(muscle: Muscle) -> None:
+    if muscle.fibre.method != "characteristics":
+        return
+    fibre = fibre_for(muscle.fibre.model, "characteristics", 0.0)
+    stuck = Muscle(Fibre(**{**fibre.__dict__, "values": {**fibre.values, "regrid": 0.0}}))
+    state = stuck.settle(0.0, 3.0)
+    with pytest.raises(StateViolation, match="grid_shift"):
+        for k in range(200):
+            state = stuck.step(state, 0.001 * k, 3.0, 2e-3)
 
 
 def test_calcium_jump_from_rest_at_full_calcium_and_1_ms(muscle: Muscle) -> None:

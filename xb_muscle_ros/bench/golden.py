@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,7 +22,15 @@ from xb_muscle_ros.models.muscle import Array, Muscle
 from xb_muscle_ros.trials.protocol import SPEED_L0_PER_S, TEST_DURATION_S
 
 # Name of a golden table -> parameter set of the fibre files.
-SETS = {"3state_coop": "3state_coop", "3state_coop_v3": "3state_coop_v3", "2state_xb": "2state"}
+SETS = {
+    "3state_coop": "3state_coop",
+    "3state_coop_v3": "3state_coop_v3",
+    "2state_xb": "2state",
+    "3state_coop_discretised": "3state_coop",
+}
+# Tables that were not made with the Gaussian form; their grid: 1,000 bins over ±15.
+METHODS = {"3state_coop_discretised": "characteristics"}
+GRID = {"bins": 1000.0, "strain_range": 15.0}
 STEPPERS = ("fixed", "variable")
 QUANTITIES = ("srs_conditioning", "srs_test", "isometric_force")
 _CONDITIONING_L0 = 0.0383
@@ -97,9 +106,7 @@ def _settled(muscle: Muscle, calcium: float, duration_s: float) -> Array:
     state = muscle.rest()
     if "drx" in muscle.state_names:
         state[muscle.state_names.index("drx")] = _READY_AT_START
-    grid = np.array([0.0, duration_s])
-    settled: Array = muscle.follow(state, grid, 0.0 * grid, 0.0 * grid + calcium, grid[1:], 1e-8)[0]
-    return settled
+    return muscle.hold(state, calcium, duration_s)
 
 
 def compare(
@@ -123,7 +130,10 @@ def compare(
         raise UserError(f"golden table '{table}' is not known; there are {', '.join(k for k in tables if k in SETS)}")
     data = tables[table]
     for fibre in list(data["fibres"])[:: every[0]]:
-        muscle = Muscle(load_fibre(fibre, SETS[table]))
+        loaded = load_fibre(fibre, SETS[table], METHODS.get(table))
+        if table in METHODS:
+            loaded = replace(loaded, values={**loaded.values, **GRID})
+        muscle = Muscle(loaded)
         cells = data["fibres"][fibre]
         for i, pca in list(enumerate(data["pCa"]))[:: every[1]]:
             calcium = 10.0 ** (6.0 - pca)

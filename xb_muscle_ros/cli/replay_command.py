@@ -33,7 +33,7 @@ def add(subparsers: Subparsers) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Replay, print the table, write the files."""
     from xb_muscle_ros.errors import UserError
-    from xb_muscle_ros.replay.run import replay, write_results
+    from xb_muscle_ros.replay.run import Player, replay, write_results
     from xb_muscle_ros.trials.bags import find_bags, read_trial
 
     if not 1 <= arguments.substeps <= 10000:
@@ -49,10 +49,12 @@ def run(arguments: argparse.Namespace) -> int:
             warn(warning)
         if trial.facts.fibre != fibre.name:
             warn(f"trial {trial.facts.trial} is of fibre {trial.facts.fibre}, replayed with parameters of {fibre.name}")
-    player = None
+    player: Player | None = None
     if arguments.live:
         # The one place where this command touches ROS, and only when asked to.
-        from xb_muscle_ros.node.player import play_live as player
+        from xb_muscle_ros.node.player import play_live
+
+        player = play_live
     results = replay(trials, fibre, player, arguments.substeps, arguments.settle)
     print(results.table)
     for path in write_results(arguments.out, trials, results):

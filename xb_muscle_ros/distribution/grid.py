@@ -31,7 +31,7 @@ SHIFT = State("grid_shift", "power strokes", "how far the grid has moved with th
 class Grid(Representation):
     """Bins n_i at the strains x_i = -range + i dx + shift; moments are sums over bins."""
 
-    parameters = (BINS, RANGE)
+    parameters: ClassVar[tuple[Parameter, ...]] = (BINS, RANGE)
     states = ()
     # The step's matrix leaves the heads' feedback on their own attachment out: variable steps would grow to the edge of
     # stability and stay restless there, steps of 1 ms come to rest.

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import sympy
 
+from xb_muscle_ros.mechanisms.base import Parameter
 from xb_muscle_ros.models.composition import INPUTS, OUTPUTS, Composition, Equations, equations
 from xb_muscle_ros.models.elimination import Elimination
 from xb_muscle_ros.models.program import Program, c, jacobian, program, python
@@ -18,7 +19,7 @@ _HEADER = '''"""Generated from the mechanisms of model {name}{smooth}; do not ed
 import math
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 
 from xb_muscle_ros.models.intrinsics import (
     hyperbolic_tangent,
@@ -52,10 +53,10 @@ def header(model: Composition, smooth: bool, order: int) -> str:
 def flat_module(model: Composition, smooth: bool) -> str:
     """A model whose every state is a symbol: one flat right-hand side, one flat Rosenbrock step."""
     e = equations(model, smooth)
-    prepare = function("prepare(p)", "Parameters and what is computed from them once: nothing here.", ["return p.copy()"])
+    prepare = function("prepare(p)", "Parameters and what is computed from them once.", ["return p.copy()"])
     stay = function("regrid(s, p, work)", "Moments need no grid.", ["pass"])
     parts = [header(model, smooth, rodas3.ORDER), prepare, stay, _rhs(e), _attempt(e), _slope(e)]
-    parts += [vector("rest", e, e.rest), _outputs(e), _violation(e, smooth)]
+    parts += [vector("rest", e.parameters, e.rest), _outputs(e), _violation(e, smooth)]
     return "\n\n".join(parts) + "\n\n\n" + kernels() + "\n"
 
 
@@ -92,10 +93,10 @@ def assignments(body: Program) -> list[str]:
     return [f"{symbol} = {python(expression)}" for symbol, expression in body.lines]
 
 
-def parameter_loads(e: Equations, used: Iterable[Any]) -> list[str]:
+def parameter_loads(parameters: Sequence[Parameter], used: Iterable[Any]) -> list[str]:
     """Lines that load the parameters among some symbols."""
     names = {str(s) for s in used}
-    return [f"{p.name} = p[{i}]" for i, p in enumerate(e.parameters) if p.name in names]
+    return [f"{p.name} = p[{i}]" for i, p in enumerate(parameters) if p.name in names]
 
 
 def used_symbols(*programs: Program) -> set[Any]:
@@ -113,7 +114,7 @@ def _rhs(e: Equations) -> str:
     """Rates of change in the fixed frame, scalars in and a tuple out: nothing touches memory."""
     body = program(e.derivatives[:-1], "t")
     names = ", ".join([*(s.name for s in e.states), "shift"])
-    lines = [*parameter_loads(e, used_symbols(body)), *assignments(body)]
+    lines = [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
     lines.append(f"return ({', '.join(python(r) for r in body.results)},)")
     text = function(f"rates({names}, velocity, calcium, p)", "Rates of the states and of the shift.", lines)
     loads = [f"z[{i}]" for i in range(len(e.states) + 1)]
@@ -134,7 +135,7 @@ def _attempt(e: Equations) -> str:
     first, entries = flat.results[:n], flat.results[n:]
     solver = Elimination([[entries[i * n + j] != 0 for j in range(n)] for i in range(n)])
     lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
-    lines += [*parameter_loads(e, used_symbols(flat)), *assignments(flat)]
+    lines += [*parameter_loads(e.parameters, used_symbols(flat)), *assignments(flat)]
     lines += ["per_h = 1.0 / h", f"diagonal = per_h * {1.0 / rodas3.GAMMA!r}"]
     for i, j in solver.entries():
         entry = entries[i * n + j]
@@ -194,7 +195,7 @@ def _slope(e: Equations) -> str:
         moving.append(sympy.sympify(total).subs(e.shift, 0))
     body = program(moving, "t")
     lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
-    lines += [*parameter_loads(e, used_symbols(body)), *assignments(body)]
+    lines += [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
     lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
     return function("slope(s, velocity, calcium, p, out)", "Rates of change of the integrated states.", lines)
 
@@ -204,15 +205,15 @@ def _outputs(e: Equations) -> str:
     n = len(e.states)
     lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
     lines += [f"{s.name} = s[{n + i}]" for i, s in enumerate(INPUTS)]
-    lines += [*parameter_loads(e, used_symbols(body)), *assignments(body)]
+    lines += [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
     lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
     return function("outputs(s, p, out)", "Forces, contractile element and states, as named in OUTPUTS.", lines)
 
 
-def vector(name: str, e: Equations, expressions: Iterable[Any]) -> str:
+def vector(name: str, parameters: Sequence[Parameter], expressions: Iterable[Any]) -> str:
     """Text of a function of the parameters that fills a vector."""
     body = program(list(expressions), "t")
-    lines = [*parameter_loads(e, used_symbols(body)), *assignments(body)]
+    lines = [*parameter_loads(parameters, used_symbols(body)), *assignments(body)]
     lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
     return function(f"{name}(p, out)", "State of a fibre at rest without calcium.", lines)
 
@@ -241,4 +242,5 @@ def compiled_text(path: Path) -> str:
     text = path.read_text(encoding="utf-8").split("# BEGIN COMPILED\n", 1)[1]
     for types in (": Array", ": float", ": int", ": Any", " -> Any", " -> None", " -> float", " -> int"):
         text = text.replace(types, "")
-    return f"\n{text}".replace("\ndef ", f"\n{_JIT}\ndef ").strip()
+    text = f"\n{text}".replace("\ndef ", f"\n{_JIT}\ndef ")
+    return text.replace(f"# PARALLEL\n{_JIT}", _JIT.replace("(", "(parallel=True, ", 1)).strip()

@@ -1,7 +1,7 @@
-"""Text of the module that steps a model on a strain grid: scalar functions from the blocks, loops over bins around them.
+"""Text of the module that steps a model on a strain grid: scalar functions from the blocks, loops over bins.
 
-The strain dependence of every rate is tabulated once per parameter set: exp(slope x) at x = X_i + c is the table's entry
-times exp(slope c), so that a step calls no exponential per bin, wherever the grid has moved.
+The strain dependence of every rate is tabulated once per parameter set: exp(slope x) at x = X_i + c is the table's
+entry times exp(slope c), so that a step calls no exponential per bin, wherever the grid has moved.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def grid_module(model: Composition, smooth: bool, remap: str) -> str:
         f"BINS, RANGE, REGRID = {index['bins']}, {index['strain_range']}, {index.get('regrid', -1)}\n"
     )
     parts = [header(model, smooth, ros2.ORDER) + constants, _rate_constants(e), _factors(e), _spreads(e), _leave(e)]
-    parts += [_others(e), _couplings(e), vector("rest_of_others", e, e.rest), _output_scalars(e), _bounds(e)]
+    parts += [_others(e), _couplings(e), vector("rest_of_others", e.parameters, e.rest), _output_scalars(e), _bounds(e)]
     parts.append(_kernels(remap))
     return "\n\n".join(parts) + "\n\n\n" + kernels() + "\n"
 
@@ -47,7 +47,7 @@ def _scalar_function(e: GridEquations, head: str, doc: str, results: Sequence[An
     body = program([sympy.sympify(r) for r in results], "t")
     used = {str(s) for s in used_symbols(body)}
     lines = [f"{s.name} = y[{i}]" for i, s in enumerate(e.states) if s.name in used]
-    lines += [*parameter_loads(e, used_symbols(body)), *assignments(body)]
+    lines += [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
     values = [python(r) for r in body.results]
     lines.append(f"return ({', '.join(v if '.' in v or not v.lstrip('-').isdigit() else v + '.0' for v in values)},)")
     arguments = [*sums, "y", *(i.name for i in INPUTS), "p"]
@@ -60,7 +60,7 @@ def _rate_constants(e: GridEquations) -> str:
     for rate, _ in e.leaving:
         slopes.append(rate.slope if isinstance(rate, ExponentialRate) else -2 * rate.steepness)
     body = program([sympy.sympify(s) for s in slopes], "t")
-    lines = [*parameter_loads(e, used_symbols(body)), *assignments(body)]
+    lines = [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
     lines.append(f"return ({', '.join(f'float({python(r)})' for r in body.results)},)")
     return function("table_slopes(p)", "Slope of each rate's tabulated exponential, per power stroke.", lines)
 
@@ -86,7 +86,8 @@ def _spreads(e: GridEquations) -> str:
 
 def _leave(e: GridEquations) -> str:
     """Detachment rates of one bin: to the ready state and torn off."""
-    back, torn = [], []
+    back: list[str] = []
+    torn: list[str] = []
     for i, (rate, is_torn) in enumerate(e.leaving):
         table = f"p[table + {i} * bins + i]"
         if isinstance(rate, ExponentialRate):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 import math
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 # The fixed stepper's guard: an embedded error of 1e-4 is 0.02 % of F0; smooth input at 1 ms stays 100 times below it.
 GUARD = 1e-4
 # Rows of scratch: four for the loops, the others for a model's step.
-_SCRATCH_ROWS = 13
+SCRATCH_ROWS = 13
 _SETTLE_TOLERANCE = 1e-8
 _LONGEST_SETTLING_S = 1e6
 
@@ -80,7 +80,7 @@ class Muscle:
         self._states = composition.representation.state_rows(composition, fibre.values)
         self.state_names: tuple[str, ...] = (*(s.name for s in self._states), "length_change", "velocity", "calcium")
         self._n = len(self.state_names)
-        self._work = np.zeros((_SCRATCH_ROWS, self._n))
+        self._work = np.zeros((SCRATCH_ROWS, self._n))
         self._out = np.zeros(len(Outputs._fields))
         # One short step now, so that the first real one finds everything compiled.
         self.outputs(self.step(self.rest(), 0.0, 0.1, 1e-6))
@@ -107,13 +107,13 @@ class Muscle:
         """
         state = self.rest(length_change_l0)
         if duration_s is not None:
-            return self._isometric(state, calcium_um, duration_s)
+            return self.hold(state, calcium_um, duration_s)
         rates = np.zeros(self._n - 3)
         chunk, total = 1.0, 0.0
         # Fixed steps cost time by the second of muscle time, variable ones hardly any.
         longest, end = (_LONGEST_SETTLING_S, _LONGEST_SETTLING_S) if self._settling.step_s is None else (4.0, 1000.0)
         while total < end:
-            state = self._isometric(state, calcium_um, chunk)
+            state = self.hold(state, calcium_um, chunk)
             total += chunk
             self.code.slope(state, 0.0, calcium_um, self.parameters, rates)
             if np.max(np.abs(rates)) < self._settling.rate:
@@ -174,7 +174,7 @@ class Muscle:
             state, *arrays, self.parameters, 0.0, GUARD, substeps, every, states, self._work
         )
         if code != 0:
-            self._raise(code, fault, float(arrays[0][: k - 1].sum() + within), states[-1])
+            self.complain(code, fault, float(arrays[0][: k - 1].sum() + within), states[-1])
         return states
 
     def follow(
@@ -202,18 +202,22 @@ class Muscle:
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (corner_s, length_change_l0, calcium_um, sample_s)]
         code, fault, t, _, _ = self.code.follow(state, *arrays, self.parameters, 1e-4, tolerance, states, self._work)
         if code != 0:
-            self._raise(code, fault, t, self._work[1])
+            self.complain(code, fault, t, self._work[1])
         return states
 
-    def _isometric(self, state: Array, calcium: float, duration_s: float) -> Array:
-        """State after some time at its own length."""
+    def hold(self, state: Array, calcium_um: float, duration_s: float) -> Array:
+        """State after `duration_s` at the state's own length with calcium (µM) held, by the method's best steps.
+
+        Raises:
+            StateViolation: see `step`.
+        """
         length = float(state[-3])
         step_s = self._settling.step_s
         if step_s is None:
-            return self._advance(state, length, calcium, duration_s, 1e-6, _SETTLE_TOLERANCE)
+            return self._advance(state, length, calcium_um, duration_s, 1e-6, _SETTLE_TOLERANCE)
         count = max(1, math.ceil(duration_s / step_s - 1e-9))
         dt = np.full(count, duration_s / count)
-        held = np.full(count + 1, calcium)
+        held = np.full(count + 1, calcium_um)
         after: Array = self.run(state, dt, np.full(count + 1, length), held, every=count)[-1]
         return after
 
@@ -223,10 +227,16 @@ class Muscle:
             state, length, calcium, dt, self.parameters, h, tolerance, out, self._work
         )
         if code != 0:
-            self._raise(code, fault, t, out)
+            self.complain(code, fault, t, out)
         return out
 
-    def _raise(self, code: int, fault: int, time_s: float, state: Array) -> None:
+    def complain(self, code: int, fault: int, time_s: float, state: Array) -> NoReturn:
+        """Raise what a result code of the compiled loops means.
+
+        Raises:
+            StateViolation: a state is at fault.
+            UserError: the step size is.
+        """
         result = _RESULTS[code]
         if fault < 0:
             raise UserError(f"fibre {self.fibre.name}: integration stopped at t = {time_s:.6g} s; {result.value}")

@@ -65,7 +65,7 @@ def rest(p: Array, out: Array) -> None:
 
 
 def attach(rates: Any, shift: float, p: Array, density: Array) -> float:
-    """Density of attaching heads over the bins (1/s per power stroke); returns the heads that come back from torn off."""
+    """Density of attaching heads over the bins (1/s per power stroke); returns the heads per second that come back."""
     bins = int(p[BINS])
     dx = 2.0 * p[RANGE] / (bins - 1)
     for i in range(bins):

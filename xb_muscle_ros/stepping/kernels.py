@@ -1,10 +1,10 @@
 """Loops around one Rosenbrock step. Their text is compiled anew beside each model's own step: see `models.codegen`.
 
-Nothing here knows a model: `attempt`, `regrid`, `slope`, `outputs` and `violation` stand for those of the generated module. All
+Nothing here knows a model: `attempt`, `regrid`, `slope`, `outputs` and `violation` stand for the generated ones. All
 functions are pure: they read the state they are given and write to `out` and `work` only.
 
-A state vector holds the integrated states, then length change (L0), velocity (L0/s) and calcium (µM). Of the scratch
-`work`, rows 0 to 3 belong to these loops, the others to the model.
+A state vector holds the integrated states, then length change (L0), velocity (L0/s) and calcium (µM). Of the
+scratch `work`, rows 0 to 3 belong to these loops, the others to the model.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numba import prange
 
 Array = npt.NDArray[np.float64]
 
@@ -260,3 +261,31 @@ def outputs_of(states: Array, p: Array, table: Array) -> None:
     """Outputs of many states, one row each."""
     for k in range(states.shape[0]):
         outputs(states[k], p, table[k])
+
+
+# PARALLEL
+def advance_many(
+    s: Array, length_end: Array, calcium: Array, dt: float, p: Array, tol: float, out: Array, work: Array, report: Array
+) -> None:
+    """One fixed step of `dt` for many fibres, spread over the cores; each is what `advance` makes of it, to the bit.
+
+    Args:
+        s: states, shape (fibres, n).
+        length_end, calcium: shape (fibres,), L0 and µM.
+        p: parameter vectors, shape (fibres, parameters).
+        out: receives states, shape (fibres, n).
+        work: scratch, shape (fibres, 13, n).
+        report: receives code, index of the state at fault and time reached in s, shape (fibres, 3).
+    """
+    for k in prange(s.shape[0]):
+        code, fault, t, _, _, _ = advance(s[k], length_end[k], calcium[k], dt, p[k], dt, tol, out[k], work[k])
+        report[k, 0] = code
+        report[k, 1] = fault
+        report[k, 2] = t
+
+
+# PARALLEL
+def outputs_many(states: Array, p: Array, table: Array) -> None:
+    """Outputs of one state of each of many fibres, one row each."""
+    for k in prange(states.shape[0]):
+        outputs(states[k], p[k], table[k])

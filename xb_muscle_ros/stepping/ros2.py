@@ -3,7 +3,8 @@
 Verwer, Spee, Blom and Hundsdorfer, A second-order Rosenbrock method applied to photochemical dispersion problems, SIAM
 J. Sci. Comput. 20 (1999) 1456-1480:
 (I - g h A) K1 = f(y),  (I - g h A) K2 = f(y + h K1) - 2 K1,  y_new = y + h (3 K1 + K2)/2, with an error of order 1 in
-y + h K1. Because A need not be exact, hundreds of strain bins cost no more than their own detachment rates on the diagonal.
+y + h K1. Because A need not be exact, hundreds of strain bins cost no more than their own detachment rates on its
+diagonal.
 """
 
 from __future__ import annotations

@@ -1,0 +1,91 @@
+"""Many fibres in one compiled call, each with its own parameters: the way into controllers and other simulators."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.muscle import GUARD, SCRATCH_ROWS, Array, Muscle, Outputs
+
+
+class MuscleBatch:
+    """Fibres of one model and one method, stepped together on all cores.
+
+    Every fibre's result is that of `Muscle.step`, bit for bit. All methods are pure.
+
+    Attributes:
+        muscles: one for each fibre, in order.
+        state_names: see `Muscle`.
+    """
+
+    def __init__(self, fibres: Sequence[Fibre]) -> None:
+        """Compile the model and line the parameters up.
+
+        Raises:
+            UserError: no fibres, or fibres of different models, methods or grids.
+        """
+        if not fibres:
+            raise UserError("a batch needs at least one fibre; give some")
+        self.muscles = tuple(Muscle(fibre) for fibre in fibres)
+        first = self.muscles[0]
+        for muscle in self.muscles[1:]:
+            if muscle.code is not first.code or len(muscle.state_names) != len(first.state_names):
+                raise UserError(
+                    f"fibres {first.fibre.name} ({first.fibre.model}, {first.fibre.method}) and {muscle.fibre.name} "
+                    f"({muscle.fibre.model}, {muscle.fibre.method}) differ in model, method, smoothing or grid; "
+                    "make one batch for each"
+                )
+        self.state_names = first.state_names
+        self._code = first.code
+        self._p = np.stack([muscle.parameters for muscle in self.muscles])
+        self._p.setflags(write=False)
+        size = (len(self.muscles), len(self.state_names))
+        self._work = np.zeros((size[0], SCRATCH_ROWS, size[1]))
+        self._report = np.zeros((size[0], 3))
+
+    def __len__(self) -> int:
+        """Number of fibres."""
+        return len(self.muscles)
+
+    def settle(self, length_change_l0: Array, calcium_um: Array) -> Array:
+        """States after isometric activation from rest, shape (fibres, n).
+
+        Args:
+            length_change_l0, calcium_um: shape (fibres,), L0 and µM.
+
+        Raises:
+            UserError, StateViolation: see `Muscle.settle`.
+        """
+        pairs = zip(self.muscles, length_change_l0, calcium_um, strict=True)
+        return np.stack([muscle.settle(float(length), float(calcium)) for muscle, length, calcium in pairs])
+
+    def step(self, states: Array, length_change_l0: Array, calcium_um: Array, dt_s: float) -> Array:
+        """States `dt_s` seconds later, shape (fibres, n); see `Muscle.step`.
+
+        Args:
+            states: shape (fibres, n).
+            length_change_l0: lengths at the end, shape (fibres,), L0; each moves linearly from its state's own.
+            calcium_um: shape (fibres,), µM, held.
+            dt_s: duration, s.
+
+        Raises:
+            StateViolation: of the first fibre that has one; no other fibre's state is lost, since none was changed.
+        """
+        out = np.empty_like(states)
+        length = np.ascontiguousarray(length_change_l0, dtype=np.float64)
+        calcium = np.ascontiguousarray(calcium_um, dtype=np.float64)
+        self._code.advance_many(states, length, calcium, dt_s, self._p, GUARD, out, self._work, self._report)
+        if self._report[:, 0].any():
+            k = int(np.flatnonzero(self._report[:, 0])[0])
+            code, fault, time_s = self._report[k]
+            self.muscles[k].complain(int(code), int(fault), float(time_s), out[k])
+        return out
+
+    def outputs(self, states: Array) -> dict[str, Array]:
+        """Outputs by name of `Outputs`, each of shape (fibres,)."""
+        table = np.empty((len(self.muscles), len(Outputs._fields)))
+        self._code.outputs_many(states, self._p, table)
+        return {name: table[:, i].copy() for i, name in enumerate(Outputs._fields)}
