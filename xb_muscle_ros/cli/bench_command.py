@@ -12,7 +12,7 @@ from xb_muscle_ros.cli.common import add_fibre
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
 
-STUDIES = ("rhs", "trial", "node")
+STUDIES = ("rhs", "trial", "batch", "start", "cost", "fast", "node")
 
 
 def add(subparsers: Subparsers) -> None:
@@ -48,6 +48,26 @@ def run(arguments: argparse.Namespace) -> int:
         if "trial" in arguments.study:
             made += trial_time.figures(muscles[0])
             made += [replace(f, name=f"{f.name}, exact") for f in trial_time.figures(muscles[1])]
+    if "batch" in arguments.study:
+        from xb_muscle_ros.bench import batch_time
+
+        made += batch_time.figures()
+    if "start" in arguments.study:
+        from xb_muscle_ros.bench import start_time
+
+        made += start_time.figures()
+    if "cost" in arguments.study:
+        from xb_muscle_ros.bench import cost
+
+        points = list(cost.Study(fibre).points())
+        made += cost.figures(points)
+        cost.draw(points, arguments.out.with_name("cost.png"))
+        print(arguments.out.with_name("cost.png"))
+    if "fast" in arguments.study:
+        from xb_muscle_ros.bench import fast_stretch
+
+        made += fast_stretch.study(fibre.name, arguments.out.with_name("fast_stretch.png"))
+        print(arguments.out.with_name("fast_stretch.png"))
     if "node" in arguments.study:
         from xb_muscle_ros.bench import node_timing
 

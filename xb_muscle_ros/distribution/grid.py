@@ -7,6 +7,7 @@ leave the bins where they are, and renumber them when they have moved by whole b
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, ClassVar
 
@@ -28,6 +29,13 @@ REGRID = Parameter(
 SHIFT = State("grid_shift", "power strokes", "how far the grid has moved with the contractile element", -200.0, 200.0)
 
 
+@functools.lru_cache(maxsize=16)
+def _rows(bins: int, others: tuple[State, ...]) -> tuple[State, ...]:
+    """Rows of a grid's states; kept, because a thousand fibres share them."""
+    of_bin = (State(f"n_{i}", "1/power stroke", "density of attached heads", 0.0, 1e4) for i in range(bins))
+    return (*of_bin, *others, SHIFT)
+
+
 class Grid(Representation):
     """Bins n_i at the strains x_i = -range + i dx + shift; moments are sums over bins."""
 
@@ -45,10 +53,7 @@ class Grid(Representation):
 
     def state_rows(self, model: Composition, values: Mapping[str, float]) -> tuple[State, ...]:
         """Bins first, then the blocks' states, then the shift of the grid."""
-        bins = tuple(
-            State(f"n_{i}", "1/power stroke", "density of attached heads", 0.0, 1e4) for i in range(int(values["bins"]))
-        )
-        return (*bins, *model.states, SHIFT)
+        return _rows(int(values["bins"]), model.states)
 
     def module_text(self, model: Composition, smooth: bool) -> str:
         """Scalar parts as expressions, bins in loops."""

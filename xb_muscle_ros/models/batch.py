@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numba
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
@@ -32,7 +33,7 @@ class MuscleBatch:
         self.muscles = tuple(Muscle(fibre) for fibre in fibres)
         first = self.muscles[0]
         for muscle in self.muscles[1:]:
-            if muscle.code is not first.code or len(muscle.state_names) != len(first.state_names):
+            if muscle.code is not first.code or muscle.parameters.size != first.parameters.size:
                 raise UserError(
                     f"fibres {first.fibre.name} ({first.fibre.model}, {first.fibre.method}) and {muscle.fibre.name} "
                     f"({muscle.fibre.model}, {muscle.fibre.method}) differ in model, method, smoothing or grid; "
@@ -42,8 +43,11 @@ class MuscleBatch:
         self._code = first.code
         self._p = np.stack([muscle.parameters for muscle in self.muscles])
         self._p.setflags(write=False)
+        for muscle, row in zip(self.muscles, self._p, strict=True):
+            # One copy of a grid's tables is enough.
+            muscle.parameters = row
         size = (len(self.muscles), len(self.state_names))
-        self._work = np.zeros((size[0], SCRATCH_ROWS, size[1]))
+        self._work = np.zeros((numba.config.NUMBA_NUM_THREADS, SCRATCH_ROWS, size[1]))
         self._report = np.zeros((size[0], 3))
 
     def __len__(self) -> int:

@@ -19,7 +19,7 @@ _HEADER = '''"""Generated from the mechanisms of model {name}{smooth}; do not ed
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import get_thread_id, njit, prange
 
 from xb_muscle_ros.models.intrinsics import (
     hyperbolic_tangent,

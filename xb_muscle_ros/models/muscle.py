@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import functools
 import math
 from typing import Any, NamedTuple, NoReturn
 
@@ -22,6 +23,9 @@ GUARD = 1e-4
 SCRATCH_ROWS = 13
 _SETTLE_TOLERANCE = 1e-8
 _LONGEST_SETTLING_S = 1e6
+
+# Compiled modules that have taken a step in this process.
+_WARM: set[Any] = set()
 
 
 class Result(enum.Enum):
@@ -60,7 +64,6 @@ class Muscle:
 
     Attributes:
         fibre: values and constants.
-        state_names: names of the entries of a state vector.
         parameters: parameter vector in the order of the model's table, read-only.
     """
 
@@ -78,12 +81,22 @@ class Muscle:
         self.parameters.setflags(write=False)
         self._settling = composition.representation.settling
         self._states = composition.representation.state_rows(composition, fibre.values)
-        self.state_names: tuple[str, ...] = (*(s.name for s in self._states), "length_change", "velocity", "calcium")
-        self._n = len(self.state_names)
-        self._work = np.zeros((SCRATCH_ROWS, self._n))
+        self._n = len(self._states) + 3
         self._out = np.zeros(len(Outputs._fields))
-        # One short step now, so that the first real one finds everything compiled.
-        self.outputs(self.step(self.rest(), 0.0, 0.1, 1e-6))
+        if self.code not in _WARM:
+            # One short step now, so that the first real one finds everything compiled.
+            self.outputs(self.step(self.rest(), 0.0, 0.1, 1e-6))
+            _WARM.add(self.code)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the entries of a state vector."""
+        return (*(s.name for s in self._states), "length_change", "velocity", "calcium")
+
+    @functools.cached_property
+    def _work(self) -> Array:
+        """Scratch for the compiled loops; one of a batch's fibres never needs its own."""
+        return np.zeros((SCRATCH_ROWS, self._n))
 
     def rest(self, length_change_l0: float = 0.0) -> Array:
         """State of a fibre at rest without calcium, at a length change in L0."""
@@ -168,14 +181,26 @@ class Muscle:
         Raises:
             StateViolation: see `step`; the time counts from the first sample.
         """
+        return self.run_counted(state, dt_s, length_change_l0, calcium_um, substeps, every)[0]
+
+    def run_counted(
+        self,
+        state: Array,
+        dt_s: Array,
+        length_change_l0: Array,
+        calcium_um: Array,
+        substeps: int = 1,
+        every: int = 1,
+    ) -> tuple[Array, int]:
+        """As `run`, with the number of steps tried."""
         states = np.zeros(((length_change_l0.size - 1) // every + 1, self._n))
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (dt_s, length_change_l0, calcium_um)]
-        code, fault, k, within, _ = self.code.run(
+        code, fault, k, within, steps = self.code.run(
             state, *arrays, self.parameters, 0.0, GUARD, substeps, every, states, self._work
         )
         if code != 0:
             self.complain(code, fault, float(arrays[0][: k - 1].sum() + within), states[-1])
-        return states
+        return states, steps
 
     def follow(
         self,
@@ -198,12 +223,26 @@ class Muscle:
         Raises:
             StateViolation: see `step`.
         """
+        return self.follow_counted(state, corner_s, length_change_l0, calcium_um, sample_s, tolerance)[0]
+
+    def follow_counted(
+        self,
+        state: Array,
+        corner_s: Array,
+        length_change_l0: Array,
+        calcium_um: Array,
+        sample_s: Array,
+        tolerance: float = 1e-6,
+    ) -> tuple[Array, int]:
+        """As `follow`, with the number of steps tried."""
         states = np.zeros((sample_s.size, self._n))
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (corner_s, length_change_l0, calcium_um, sample_s)]
-        code, fault, t, _, _ = self.code.follow(state, *arrays, self.parameters, 1e-4, tolerance, states, self._work)
+        code, fault, t, steps, _ = self.code.follow(
+            state, *arrays, self.parameters, 1e-4, tolerance, states, self._work
+        )
         if code != 0:
             self.complain(code, fault, t, self._work[1])
-        return states
+        return states, steps
 
     def hold(self, state: Array, calcium_um: float, duration_s: float) -> Array:
         """State after `duration_s` at the state's own length with calcium (µM) held, by the method's best steps.
@@ -240,7 +279,7 @@ class Muscle:
         result = _RESULTS[code]
         if fault < 0:
             raise UserError(f"fibre {self.fibre.name}: integration stopped at t = {time_s:.6g} s; {result.value}")
-        name = self.state_names[fault]
+        name = self._states[fault].name
         lower, upper = self._states[fault].lower, self._states[fault].upper
         raise StateViolation(
             self.fibre.name, name, time_s, float(state[fault]), f"{lower:g} to {upper:g}", result.value

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import prange
+from numba import get_thread_id, prange
 
 Array = npt.NDArray[np.float64]
 
@@ -274,11 +274,12 @@ def advance_many(
         length_end, calcium: shape (fibres,), L0 and µM.
         p: parameter vectors, shape (fibres, parameters).
         out: receives states, shape (fibres, n).
-        work: scratch, shape (fibres, 13, n).
+        work: scratch, shape (threads, 13, n).
         report: receives code, index of the state at fault and time reached in s, shape (fibres, 3).
     """
     for k in prange(s.shape[0]):
-        code, fault, t, _, _, _ = advance(s[k], length_end[k], calcium[k], dt, p[k], dt, tol, out[k], work[k])
+        scratch = work[get_thread_id()]
+        code, fault, t, _, _, _ = advance(s[k], length_end[k], calcium[k], dt, p[k], dt, tol, out[k], scratch)
         report[k, 0] = code
         report[k, 1] = fault
         report[k, 2] = t

@@ -1,0 +1,211 @@
+"""Cost against accuracy of the solution methods, after the paper's study (van der Zee et al. 2026, Fig 8).
+
+One condition (AMP 3.83 % L0, RT 1 ms, pCa 6.1, 2.34 s, steps of 1e-4 s). The strain grid is varied in two ways: more
+bins over ±15 power strokes, and more range at the bin width of 100 bins over ±15. Force errors are root mean squares
+against characteristics with 10,000 bins over ±15.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from xb_muscle_ros.bench.measure import Figure
+from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, THIRD, figure, save
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.muscle import Array, Muscle
+from xb_muscle_ros.models.registry import compose
+from xb_muscle_ros.trials.protocol import StretchShortenStretch
+
+_DURATION_S = 2.34
+_STEP_S = 1e-4
+_PCA = 6.1
+REFERENCE_BINS = 10000
+BINS = (25, 50, 100, 200, 400, 1000, 2000)
+RANGES = (4.0, 7.0, 15.0, 30.0)
+_WIDTH = 30.0 / 99.0
+LOOKS = {
+    "fixed_grid": ("linear remap", "s", DATA),
+    "fixed_grid_conservative": ("conservative remap", "^", THIRD),
+    "characteristics": ("characteristics", "o", MODEL),
+    "gaussian": ("Gaussian", "D", SECOND),
+}
+# Read off the paper's text, MATLAB: one evaluation in µs, the trial in s.
+PAPER = {"gaussian": (17.0, 0.4), "characteristics": (25.0, 0.6)}
+
+
+@dataclass(frozen=True)
+class Point:
+    """One method on one grid.
+
+    Attributes:
+        method: registry name.
+        bins, strain_range: of the grid; 0 for the Gaussian form.
+        series: ``bins`` (range fixed), ``range`` (bin width fixed) or ``variable`` (variable steps).
+        evaluations: right-hand sides evaluated.
+        seconds: median time of the trial.
+        error_f0: root-mean-square force error, F0.
+    """
+
+    method: str
+    bins: int
+    strain_range: float
+    series: str
+    evaluations: int
+    seconds: float
+    error_f0: float
+
+
+def _fibre(fibre: Fibre, method: str, bins: int, strain_range: float) -> Fibre:
+    values = dict(fibre.values)
+    for row in compose(fibre.model, method).parameters:
+        if row.name not in values and row.default is not None:
+            values[row.name] = row.default
+    if "bins" in values:
+        values |= {"bins": float(bins), "strain_range": strain_range}
+    return replace(fibre, method=method, values=values)
+
+
+class Study:
+    """The condition, and the reference that errors are taken against."""
+
+    def __init__(self, fibre: Fibre, repeats: int = 5, reference_bins: int = REFERENCE_BINS) -> None:
+        """Compute the reference (a few seconds)."""
+        self.fibre = fibre
+        self._repeats = repeats
+        protocol = StretchShortenStretch(0.0383, 0.001, lead_s=2.0, hold_s=0.0)
+        end = float(protocol.corners()[0][-1])
+        protocol = replace(protocol, hold_s=max(0.0, _DURATION_S - end))
+        self.corner_s, self.corner_l0 = protocol.corners()
+        self.time_s = np.arange(round(_DURATION_S / _STEP_S) + 1) * _STEP_S
+        self.length = np.interp(self.time_s, self.corner_s, self.corner_l0)
+        self.calcium = 10.0 ** (6.0 - _PCA)
+        self.held = np.full(self.time_s.size, self.calcium)
+        self.reference = self._force(Muscle(_fibre(fibre, "characteristics", reference_bins, 15.0)))
+
+    def _force(self, muscle: Muscle) -> Array:
+        start = muscle.settle(0.0, self.calcium)
+        states = muscle.run(start, np.diff(self.time_s), self.length, self.held, every=10)
+        return muscle.outputs_of(states)["force_f0"]
+
+    def _error(self, force: Array) -> float:
+        return float(np.sqrt(np.mean((force - self.reference) ** 2)))
+
+    def point(self, method: str, bins: int, strain_range: float, series: str) -> Point:
+        """Measure a method with steps of 1e-4 s."""
+        muscle = Muscle(_fibre(self.fibre, method, bins, strain_range))
+        start = muscle.settle(0.0, self.calcium)
+        dt = np.diff(self.time_s)
+        seconds = []
+        for _ in range(self._repeats):
+            begin = time.perf_counter()
+            states, steps = muscle.run_counted(start, dt, self.length, self.held, every=10)
+            seconds.append(time.perf_counter() - begin)
+        force = muscle.outputs_of(states)["force_f0"]
+        # Right-hand sides in a step of the moments' and of the grids' stepper.
+        evaluations = (3 if muscle.code.ORDER == 3 else 2) * steps
+        return Point(method, bins, strain_range, series, evaluations, float(np.median(seconds)), self._error(force))
+
+    def variable(self, tolerance: float) -> Point:
+        """The Gaussian form with variable steps."""
+        muscle = Muscle(_fibre(self.fibre, "gaussian", 0, 0.0))
+        start = muscle.settle(0.0, self.calcium)
+        sample = self.time_s[::10]
+        sample = np.minimum(sample, self.corner_s[-1])
+        corner_calcium = np.full(self.corner_s.size, self.calcium)
+        seconds = []
+        for _ in range(4 * self._repeats):
+            begin = time.perf_counter()
+            states, steps = muscle.follow_counted(
+                start, self.corner_s, self.corner_l0, corner_calcium, sample, tolerance
+            )
+            seconds.append(time.perf_counter() - begin)
+        error = self._error(muscle.outputs_of(states)["force_f0"])
+        return Point("gaussian", 0, 0.0, "variable", 3 * steps, float(np.median(seconds)), error)
+
+    def points(self) -> Iterator[Point]:
+        """All points, cheapest method first."""
+        yield self.point("gaussian", 0, 0.0, "bins")
+        for tolerance in (1e-4, 1e-6):
+            yield self.variable(tolerance)
+        for method in ("characteristics", "fixed_grid", "fixed_grid_conservative"):
+            for bins in BINS:
+                yield self.point(method, bins, 15.0, "bins")
+            for strain_range in RANGES:
+                if strain_range != 15.0:
+                    yield self.point(method, 1 + round(2.0 * strain_range / _WIDTH), strain_range, "range")
+
+
+def figures(points: list[Point]) -> list[Figure]:
+    """Points as entries of ``bench.json``."""
+    made = []
+    for p in points:
+        grid = f", {p.bins} bins over ±{p.strain_range:g}" if p.bins else ""
+        steps = ", variable steps" if p.series == "variable" else ""
+        name = f"cost study, {p.method}{grid}{steps}"
+        paper = ""
+        if p.method in PAPER and (p.bins in (0, 100)) and p.strain_range in (0.0, 15.0) and not steps:
+            paper = f"; paper: {1e3 * PAPER[p.method][1]:.0f} ms"
+        made.append(Figure(name, 1e3 * p.seconds, "ms", None, f"{p.evaluations} evaluations{paper}"))
+        what = f"RMS against characteristics, {REFERENCE_BINS} bins"
+        made.append(Figure(f"{name}, force error", 100.0 * p.error_f0, "% F0", None, what))
+    return made
+
+
+def draw(points: list[Point], path: Path) -> None:
+    """Time and error against the number of bins, and error against time, for both ways to vary the grid."""
+    from matplotlib.ticker import NullFormatter, NullLocator
+
+    with figure(178.0, 115.0) as made:
+        axes = made.subplots(2, 3)
+        for row, (series, title) in enumerate((("bins", "range fixed at ±15"), ("range", "bin width fixed"))):
+            time_axes, error_axes, both = axes[row]
+            for method, (label, marker, colour) in LOOKS.items():
+                chosen = [
+                    p
+                    for p in points
+                    if p.method == method and (p.series == series or (series == "range" and p.bins == 100))
+                ]
+                if not chosen or method == "gaussian":
+                    continue
+                chosen.sort(key=lambda p: p.bins)
+                bins = [p.bins for p in chosen]
+                look = {"marker": marker, "color": colour, "markersize": 4, "label": label}
+                time_axes.loglog(bins, [1e3 * p.seconds for p in chosen], **look)
+                error_axes.loglog(bins, [100.0 * p.error_f0 for p in chosen], **look)
+                both.loglog([1e3 * p.seconds for p in chosen], [100.0 * p.error_f0 for p in chosen], **look)
+            for p in points:
+                if p.method == "gaussian":
+                    label, marker, colour = LOOKS["gaussian"]
+                    variable = p.series == "variable"
+                    if not variable:
+                        time_axes.axhline(1e3 * p.seconds, color=colour, linestyle=":", linewidth=1)
+                        error_axes.axhline(100.0 * p.error_f0, color=colour, linestyle=":", linewidth=1)
+                    both.loglog(
+                        1e3 * p.seconds, 100.0 * p.error_f0, marker, color=colour, markersize=5,
+                        markerfacecolor="none" if variable else colour,
+label=None if variable and p is not points[1] else label + ", variable steps" * variable,
+                    )  # fmt: skip
+            time_axes.set_ylabel(f"{title}\nTime for 2.34 s (ms)")
+            error_axes.set_ylabel("Force error (% F$_0$)")
+            both.set_ylabel("Force error (% F$_0$)")
+            for one in (time_axes, error_axes):
+                ticks = sorted({p.bins for p in points if p.bins and (p.series == series or p.bins == 100)})
+                one.set_xticks(ticks, [str(t) for t in ticks], rotation=45)
+                one.xaxis.set_minor_locator(NullLocator())
+                one.set_xlabel("Bins")
+            for one in axes[row]:
+                one.yaxis.set_minor_formatter(NullFormatter())
+            both.set_xlabel("Time for 2.34 s (ms)")
+        handles, labels = axes[0][2].get_legend_handles_labels()
+        made.legend(handles, labels, loc="outside upper center", ncols=5, frameon=False)
+        save(made, path)
+
+
+def as_records(points: list[Point]) -> list[dict[str, object]]:
+    """Points as plain records."""
+    return [asdict(p) for p in points]
