@@ -1,0 +1,59 @@
+"""What the node says of itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from xb_muscle_ros.node.lateness import LatenessSummary
+from xb_muscle_ros.node.status import Account, Status
+
+LATE = LatenessSummary(1000, 60.0, 300.0, 900.0, 1500.0)
+
+
+def status_of(**changes: Any) -> Any:
+    """The status that a report makes; fields of `Report` may be given."""
+    from xb_muscle_ros.node.diagnostics import Report, diagnostics
+
+    status = Status(ticks=10, violations=0, fault="", waiting="", lateness=LATE, overruns=3, dropped=1)
+    report = Report(**{"node": "/a/muscle", "mode": "realtime", "state": "active", "status": status, **changes})
+    return diagnostics(report).status[0]
+
+
+@pytest.mark.usefixtures("domain")
+def test_levels() -> None:
+    """Stopped is an error, odd or refused input and overruns are warnings, inactive is fine."""
+    from diagnostic_msgs.msg import DiagnosticStatus
+
+    from xb_muscle_ros.node.inputs import Counts
+
+    assert (status_of().level, status_of().message) == (DiagnosticStatus.OK, "stepping")
+    fault = Status(ticks=10, violations=1, fault="state q2 became -1", waiting="")
+    stopped = status_of(status=fault)
+    assert stopped.level == DiagnosticStatus.ERROR
+    assert stopped.message == "stopped: state q2 became -1; call ~/reset to start again"
+    assert status_of(state="inactive", status=fault).level == DiagnosticStatus.OK
+    refused = Counts()
+    refused["not finite"] += 2
+    warned = status_of(refused=refused, overruns_new=3)
+    assert (warned.level, warned.message) == (DiagnosticStatus.WARN, "refused 2 samples; 3 overruns")
+
+
+@pytest.mark.usefixtures("domain")
+def test_values() -> None:
+    """Everything a dashboard needs, by name."""
+    values = {pair.key: pair.value for pair in status_of(rate_hz=999.96, input_age_s=0.25).values}
+    assert values["lateness p50 (µs)"] == "60.0"
+    assert values["lateness max (µs)"] == "1500.0"
+    assert values["overruns"] == "3"
+    assert values["rate (Hz)"] == "1000.0"
+    assert values["input age (s)"] == "0.250"
+    assert values["state violations"] == "0"
+
+
+def test_account_can_be_read_back() -> None:
+    """The player reads it from the reply to a reset."""
+    account = Account(100, 7, 1)
+    assert Account.read(f"state forgotten after {account}; the next one settles") == account
+    assert Account.read("nothing of the kind") is None

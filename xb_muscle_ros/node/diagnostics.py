@@ -1,0 +1,104 @@
+"""The node's account of itself as diagnostic_msgs, once a second."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from xb_muscle_ros.node.inputs import Counts
+from xb_muscle_ros.node.status import Status
+
+
+@dataclass
+class Report:
+    """Everything a report is made from.
+
+    Attributes:
+        node, fibre, model, mode, state: names; `state` is that of the lifecycle.
+        status: of the stepping; None where none is configured.
+        rate_hz: steps per second since the last report.
+        input_age_s: since the last length sample that was taken; None where there was none.
+        refused: how often input was refused, by reason.
+        odd: input that was taken but is worth knowing of, by reason.
+        ignored_names: names in messages that belong to no fibre here.
+        cpu_share: of one core since the last report, whole process.
+    """
+
+    node: str
+    mode: str
+    state: str
+    fibre: str = ""
+    model: str = ""
+    status: Status | None = None
+    rate_hz: float = 0.0
+    input_age_s: float | None = None
+    refused: Counts = field(default_factory=Counts)
+    odd: Counts = field(default_factory=Counts)
+    ignored_names: int = 0
+    cpu_share: float = 0.0
+    overruns_new: int = 0
+
+
+def diagnostics(report: Report) -> DiagnosticArray:
+    """Message for ``/diagnostics``; the sender adds the stamp."""
+    level, text = _verdict(report)
+    return DiagnosticArray(
+        status=[
+            DiagnosticStatus(
+                level=level,
+                name=report.node.lstrip("/"),
+                message=text,
+                hardware_id=report.fibre,
+                values=[KeyValue(key=key, value=value) for key, value in _values(report).items()],
+            )
+        ]
+    )
+
+
+def _verdict(report: Report) -> tuple[bytes, str]:
+    status = report.status
+    refused, odd = report.refused.new(), report.odd.new()
+    if status is None or report.state != "active":
+        return DiagnosticStatus.OK, report.state
+    if status.fault:
+        return DiagnosticStatus.ERROR, f"stopped: {status.fault}; call ~/reset to start again"
+    remarks = [status.waiting] if status.waiting else []
+    if refused:
+        remarks.append(f"refused {refused} samples")
+    if odd:
+        remarks.append(f"odd input {odd} times")
+    if report.overruns_new:
+        remarks.append(f"{report.overruns_new} overruns")
+    return (DiagnosticStatus.WARN, "; ".join(remarks)) if remarks else (DiagnosticStatus.OK, "stepping")
+
+
+def _values(report: Report) -> Mapping[str, str]:
+    values = {
+        "state": report.state,
+        "mode": report.mode,
+        "fibre": report.fibre,
+        "model": report.model,
+        "rate (Hz)": f"{report.rate_hz:.1f}",
+        "input age (s)": "none yet" if report.input_age_s is None else f"{report.input_age_s:.3f}",
+        "CPU (share of one core)": f"{report.cpu_share:.3f}",
+    }
+    status = report.status
+    if status is not None:
+        values["ticks"] = str(status.ticks)
+        values["state violations"] = str(status.violations)
+        if status.lateness is not None:
+            late = status.lateness
+            values["ticks since reset"] = str(late.ticks)
+            values["lateness p50 (µs)"] = f"{late.p50_us:.1f}"
+            values["lateness p99 (µs)"] = f"{late.p99_us:.1f}"
+            values["lateness p99.9 (µs)"] = f"{late.p999_us:.1f}"
+            values["lateness max (µs)"] = f"{late.max_us:.1f}"
+            values["overruns"] = str(status.overruns)
+            values["dropped ticks"] = str(status.dropped)
+    values["refused"] = str(sum(report.refused.values()))
+    values.update({f"refused: {reason}": str(count) for reason, count in sorted(report.refused.items())})
+    values.update({f"odd: {reason}": str(count) for reason, count in sorted(report.odd.items())})
+    values["ignored names"] = str(report.ignored_names)
+    return values

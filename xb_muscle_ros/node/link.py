@@ -1,0 +1,156 @@
+"""A client of a running muscle node: finds it, asks it, talks to its topics."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from types import TracebackType
+from typing import Any
+
+import rclpy
+from lifecycle_msgs.srv import GetState  # type: ignore[import-untyped, unused-ignore]
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
+from rclpy.context import Context
+from rclpy.parameter import Parameter, parameter_value_to_python
+from std_srvs.srv import Trigger
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.node.executor import make_executor
+from xb_muscle_ros.node.status import Account
+
+_ANSWER_S = 10.0
+
+
+class Link:
+    """A node of its own with a muscle node on the other side; closes with the ``with`` block.
+
+    Attributes:
+        node: the rclpy node.
+        peer: full name of the muscle node; empty until found.
+    """
+
+    def __init__(self, name: str, namespace: str = "", domain_id: int | None = None) -> None:
+        """Join the graph; `domain_id` None stands for that of the environment.
+
+        Raises:
+            UserError: ROS cannot be started.
+        """
+        self.peer = ""
+        self._context = Context()
+        try:
+            # In a context of its own, and deaf to the arguments of the program that uses it.
+            self._context.init(args=[], domain_id=domain_id)
+            self.node: Any = rclpy.create_node(
+                name, context=self._context, namespace=namespace, use_global_arguments=False
+            )
+        except Exception as error:
+            raise UserError(f"ROS 2 cannot be started: {error}; check ROS_DOMAIN_ID and the network") from error
+        self._executor = make_executor(self._context)
+        self._executor.add_node(self.node)
+
+    def __enter__(self) -> Link:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._executor.remove_node(self.node)
+        self._executor.shutdown()
+        self.node.destroy_node()
+        self._context.try_shutdown()
+
+    def wait_for(self, condition: Callable[[], bool], timeout_s: float) -> bool:
+        """Serve callbacks until a condition holds; False where it does not within the time."""
+        end = time.monotonic() + timeout_s
+        while not condition():
+            rest = end - time.monotonic()
+            if rest <= 0.0:
+                return False
+            self._executor.spin_once(timeout_sec=min(rest, 0.05))
+        return True
+
+    def find(self, timeout_s: float, start_command: str) -> None:
+        """Find the one node that publishes ``muscle/force`` in this namespace.
+
+        Raises:
+            UserError: none within the time, or several.
+        """
+        topic = self.node.resolve_topic_name("muscle/force")
+
+        def names() -> set[str]:
+            ends = self.node.get_publishers_info_by_topic(topic)
+            found = {f"{end.node_namespace.rstrip('/')}/{end.node_name}" for end in ends}
+            # For a moment after a node appears its publishers are known but its name is not.
+            return {name for name in found if "_NODE_NAME_UNKNOWN_" not in name}
+
+        if not self.wait_for(lambda: bool(names()), timeout_s):
+            raise UserError(
+                f"no active muscle_node publishes {topic} (looked for {timeout_s:g} s); start one in another terminal: "
+                f"{start_command}"
+            )
+        found = names()
+        if len(found) > 1:
+            raise UserError(f"{topic} is published by {', '.join(sorted(found))}; leave one of them running")
+        self.peer = found.pop()
+
+    def call(self, kind: Any, service: str, request: Any, timeout_s: float = _ANSWER_S) -> Any:
+        """Response of a service of the muscle node, for example ``reset``.
+
+        Raises:
+            UserError: no response.
+        """
+        client = self.node.create_client(kind, f"{self.peer}/{service}")
+        try:
+            if self.wait_for(client.service_is_ready, timeout_s):
+                future = client.call_async(request)
+                if self.wait_for(future.done, timeout_s):
+                    return future.result()
+        finally:
+            self.node.destroy_client(client)
+        raise UserError(f"node {self.peer} does not answer to {service}; is it still running?")
+
+    def parameters(self, names: list[str]) -> dict[str, Any]:
+        """Values of the muscle node's parameters; those it does not have are absent."""
+        values = self.call(GetParameters, "get_parameters", GetParameters.Request(names=names)).values
+        if len(values) == len(names):
+            return {name: parameter_value_to_python(value) for name, value in zip(names, values, strict=True)}
+        if len(names) == 1:
+            return {}
+        # One unknown name empties the whole answer; ask one by one.
+        return {name: value for one in names for name, value in self.parameters([one]).items()}
+
+    def set_parameters(self, values: Mapping[str, object]) -> None:
+        """Set parameters of the muscle node, all or none.
+
+        Raises:
+            UserError: refused; with the node's reason.
+        """
+        messages = [Parameter(name, value=value).to_parameter_msg() for name, value in values.items()]
+        request = SetParametersAtomically.Request(parameters=messages)
+        result = self.call(SetParametersAtomically, "set_parameters_atomically", request).result
+        if not result.successful:
+            raise UserError(f"node {self.peer}: {result.reason}")
+
+    def state(self) -> str:
+        """State of the muscle node's lifecycle."""
+        return str(self.call(GetState, "get_state", GetState.Request()).current_state.label)
+
+    def reset(self) -> Account:
+        """Make the muscle node forget its state; returns what it had taken since the last reset.
+
+        Raises:
+            UserError: it does not.
+        """
+        response = self.call(Trigger, "reset", Trigger.Request())
+        if not response.success:
+            raise UserError(f"node {self.peer}: {response.message}")
+        account = Account.read(response.message)
+        if account is None:
+            raise UserError(f"node {self.peer} answers to reset with '{response.message}'; use the same version there")
+        return account

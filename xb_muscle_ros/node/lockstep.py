@@ -1,0 +1,128 @@
+"""Lockstep: one step per length sample, by the samples' own stamps, so that the same input gives the same bits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.errors import StateViolation, UserError
+from xb_muscle_ros.models.muscle import Muscle, Outputs
+from xb_muscle_ros.node.inputs import (
+    VELOCITY_L0_PER_S,
+    CalciumHistory,
+    Counts,
+    Refusal,
+    Scale,
+    after,
+    checked,
+    length_change_l0,
+)
+from xb_muscle_ros.node.status import Account, Status
+
+Emit = Callable[[int, Outputs, Scale], None]
+
+
+class Lockstep:
+    """Answers every length sample at once, in the callback that brings it.
+
+    Calcium is held from its stamp to the next one. The step that ends at t_k uses the newest calcium with a stamp not
+    after t_(k-1), so that a calcium sample has one whole step's time to arrive. The first sample settles isometrically.
+
+    Attributes:
+        muscle: what is stepped; may be exchanged between samples for one of the same model.
+        next_scale: becomes the scale in use at the next reset.
+        counts: what was odd about the input that was taken nevertheless.
+    """
+
+    def __init__(self, muscle: Muscle, scale: Scale, emit: Emit) -> None:
+        self.muscle = muscle
+        self.next_scale = scale
+        self.counts = Counts()
+        self._emit = emit
+        self._samples = 0
+        self._violations = 0
+        self._run = _Run(scale)
+
+    def start(self) -> None:
+        """Nothing to start: samples drive it."""
+
+    def stop(self) -> None:
+        """Nothing to stop."""
+
+    def reset(self) -> Account:
+        """Forget state, stamps and calcium; the next length sample settles anew. Returns what was taken until now."""
+        run, self._run = self._run, _Run(self.next_scale)
+        return Account(run.samples, run.calcium_samples, run.late)
+
+    def take_calcium(self, stamp: int, calcium_um: float) -> None:
+        """Keep a calcium sample (stamp in ns, µM).
+
+        Raises:
+            Refusal: the stamp is not after the last one.
+        """
+        run = self._run
+        run.calcium.add(after(stamp, run.calcium.last_stamp, "calcium"), calcium_um)
+        run.calcium_samples += 1
+        if run.asked is not None and stamp <= run.asked:
+            # A step that should have used it is done: this run differs from an offline replay of the same samples.
+            run.late += 1
+            self.counts["late calcium"] += 1
+
+    def take_length(self, stamp: int, position_m: float, velocity_m_per_s: float | None) -> None:
+        """Step to a length sample (stamp in ns, m) and emit the answer; the velocity is not needed here.
+
+        Raises:
+            Refusal: the sample cannot be integrated.
+            UserError: integration failed; it stays stopped until the next reset.
+        """
+        del velocity_m_per_s
+        run = self._run
+        if run.fault:
+            raise Refusal("stopped", "integration failed before; call ~/reset to start again")
+        change = length_change_l0(position_m, run.scale)
+        last = run.stamp
+        stamp = after(stamp, last, "length")
+        asked = stamp if last is None else last
+        calcium = run.calcium.at(asked)
+        if calcium is None:
+            raise Refusal("waiting for calcium", f"none with a stamp up to {asked * 1e-9:.9f} s; publish it first")
+        if last is not None:
+            velocity = (change - run.change) / ((stamp - last) / 1e9)
+            checked(velocity, VELOCITY_L0_PER_S, "velocity from the last sample to this", "L0/s")
+        try:
+            if run.state is None or last is None:
+                run.state = self.muscle.settle(change, calcium)
+            else:
+                run.state = self.muscle.step(run.state, change, calcium, (stamp - last) / 1e9)
+        except UserError as error:
+            self._violations += isinstance(error, StateViolation)
+            run.fault = f"{error} (in the step from {asked * 1e-9:.9f} s to {stamp * 1e-9:.9f} s)"
+            raise UserError(run.fault) from error
+        run.stamp, run.change, run.asked = stamp, change, asked
+        run.samples += 1
+        self._samples += 1
+        self._emit(stamp, self.muscle.outputs(run.state), run.scale)
+
+    def status(self) -> Status:
+        """How it goes."""
+        waiting = "" if self._run.state is not None else "waiting for the first length sample and its calcium"
+        return Status(ticks=self._samples, violations=self._violations, fault=self._run.fault, waiting=waiting)
+
+
+class _Run:
+    """What a reset forgets."""
+
+    def __init__(self, scale: Scale) -> None:
+        self.scale = scale
+        self.state: npt.NDArray[np.float64] | None = None
+        # Stamp (ns) and length change (L0) of the last length sample, and until when calcium was asked for, ns.
+        self.stamp: int | None = None
+        self.change = 0.0
+        self.asked: int | None = None
+        self.calcium = CalciumHistory()
+        self.fault = ""
+        self.samples = 0
+        self.calcium_samples = 0
+        self.late = 0

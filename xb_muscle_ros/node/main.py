@@ -1,0 +1,118 @@
+"""Entry point of ``muscle_node``: arguments, signals, exit codes."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import re
+import signal
+import sys
+from collections.abc import Sequence
+from types import FrameType
+
+from xb_muscle_ros.errors import UserError
+
+USAGE = """\
+usage: muscle_node --ros-args [--params-file FILE] [-p NAME:=VALUE]... [-r __ns:=/NAMESPACE]
+
+A muscle fibre as a ROS 2 node: subscribes muscle/length and muscle/calcium, publishes muscle/force and muscle/moments.
+  muscle_node --ros-args --params-file config/fibers/18Dec2017a.yaml -p mode:=lockstep
+  muscle_node --ros-args -p fiber_file:=18Dec2017a -p mode:=realtime -p rate_hz:=1000.0
+docs/node.md lists parameters, topics and services."""
+
+
+class _Stop:
+    """Set by SIGINT and SIGTERM."""
+
+    asked = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        self.asked = True
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Run the node until it is told to stop.
+
+    Args:
+        argv: arguments without the program; those of the process where None.
+
+    Raises:
+        SystemExit: code 2 after one line on stderr, where the user can mend something.
+    """
+    stop = _Stop()
+    # Set here and not by rclpy, so that a signal ends the program quietly at any moment of its life, and so that SIGINT
+    # counts even where a shell started the program in the background with SIGINT ignored.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
+    try:
+        _run([*(sys.argv[1:] if argv is None else argv)], stop)
+    except UserError as error:
+        print(f"muscle_node: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+
+
+def _run(arguments: list[str], stop: _Stop) -> None:
+    try:
+        import rclpy
+        from rclpy.signals import SignalHandlerOptions
+        from rclpy.utilities import remove_ros_args, try_shutdown
+    except ImportError as error:
+        raise UserError(f"ROS 2 cannot be imported ({error}); source a ROS 2 Jazzy, or run scripts/setup") from error
+    if "-h" in arguments or "--help" in arguments:
+        print(USAGE)
+        return
+    try:
+        # The first entry stands for the program.
+        rest = remove_ros_args(["muscle_node", *arguments])[1:]
+        if rest:
+            raise UserError(f"argument '{rest[0]}' is not known; ROS arguments come after --ros-args (see --help)")
+        rclpy.init(args=["muscle_node", *arguments], signal_handler_options=SignalHandlerOptions.NO)
+    except UserError:
+        raise
+    except Exception as error:
+        raise UserError(f"ROS arguments cannot be used: {_first_words(error)}{_hint(arguments)}") from error
+    try:
+        _spin(stop)
+    finally:
+        try_shutdown()
+
+
+def _spin(stop: _Stop) -> None:
+    from xb_muscle_ros.node.executor import make_executor
+    from xb_muscle_ros.node.muscle_node import MuscleNode
+
+    try:
+        node = MuscleNode()
+    except UserError:
+        raise
+    except Exception as error:
+        raise UserError(f"the node cannot be created: {_first_words(error)}; check names and parameters") from error
+    try:
+        node.autostart()
+        executor = make_executor()
+        executor.add_node(node)
+        while not stop.asked and not node.finished:
+            executor.spin_once(timeout_sec=0.1)
+        # Let the answer to the request that ended the node go out.
+        executor.spin_once(timeout_sec=0.1)
+        executor.shutdown()
+    finally:
+        node.close()
+        node.destroy_node()
+
+
+def _first_words(error: Exception) -> str:
+    """Text of an error of ROS without the places in ROS' own source."""
+    text = " ".join(str(error).split())
+    return text.split(", at ")[0]
+
+
+def _hint(arguments: list[str]) -> str:
+    # ROS' grammar of -p has no names with a part that starts with a digit; parameter files have.
+    if any(re.match(r"[^:]*\.\d[^:]*:=", argument) for argument in arguments):
+        return "; a name such as models.3state_coop.f can be given in a parameter file only, not with -p"
+    return "; see --help"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,245 @@
+"""The muscle node: length and calcium in, force out; a lifecycle node."""
+
+# rclpy has types for a part of itself only.
+# mypy: allow-untyped-calls, allow-subclassing-any
+
+from __future__ import annotations
+
+import gc
+import time
+from typing import Any
+
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.qos import QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.node.inlet import Inlet
+from xb_muscle_ros.node.inputs import Scale
+from xb_muscle_ros.node.lockstep import Lockstep
+from xb_muscle_ros.node.outputs import OutputMessages
+from xb_muscle_ros.node.parameter_gate import ParameterGate
+from xb_muscle_ros.node.realtime import Realtime, Settings
+from xb_muscle_ros.node.reporter import Reporter
+
+_DEEP = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
+_NEWEST = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
+# A lost sample breaks lockstep; in realtime an old one is worth less than none.
+_INPUT_QOS = {"lockstep": _DEEP, "realtime": _NEWEST}
+
+
+class MuscleNode(LifecycleNode):
+    """One fibre on the ROS graph.
+
+    Attributes:
+        finished: whether the lifecycle has come to its end.
+        failure: why the last transition failed; None where it did not.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        """Declare parameters; nothing else happens until the node is configured.
+
+        Args:
+            options: as for `rclpy.node.Node`.
+        """
+        super().__init__("muscle_node", automatically_declare_parameters_from_overrides=True, **options)
+        self.finished = False
+        self.failure: UserError | None = None
+        self._gate = ParameterGate(self, self._use_fibre, self._use_settings)
+        self._mode: str = self._gate.value("mode")
+        self._stepping: Lockstep | Realtime | None = None
+        self._inlet: Inlet | None = None
+        self._entities: list[tuple[Any, Any]] = []
+        self._reporter = Reporter(self, self._mode)
+        self.create_service(Trigger, "~/reset", self._on_reset)
+        # The default timer would follow ROS time, which may stand still.
+        self._clock_of_reports = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(1.0, self._report, clock=self._clock_of_reports)
+        self._survive_wrong_transitions()
+
+    def autostart(self) -> None:
+        """Configure and activate, if the parameter says so.
+
+        Raises:
+            UserError: what is wrong with the configuration.
+        """
+        if not self._gate.value("autostart"):
+            if self._gate.error is not None:
+                self.get_logger().error(str(self._gate.error))
+            return
+        for transition in (self.trigger_configure, self.trigger_activate):
+            if transition() != TransitionCallbackReturn.SUCCESS:
+                raise self.failure or UserError("the node could not be started; its log says why")
+
+    def close(self) -> None:
+        """Stop stepping; the node can then be destroyed."""
+        if self._stepping is not None:
+            self._stepping.stop()
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Build the fibre and connect to the topics."""
+        try:
+            fibre = self._gate.configure()
+            muscle = Muscle(fibre)
+            # The first settling loads what later ones need.
+            muscle.settle(0.0, 0.1)
+            self._connect(fibre, muscle)
+        except UserError as error:
+            return self._fail(error)
+        except Exception as error:
+            # rclpy keeps quiet about exceptions in transitions.
+            return self._fail(UserError(f"{type(error).__name__}: {error}"))
+        constants = f"1 L0 = {fibre.reference_length_m:g} m, 1 F0 = {fibre.f0_n:g} N"
+        self.get_logger().info(f"fibre {fibre.name}, model {fibre.model}, mode {self._mode}; {constants}")
+        return super().on_configure(state)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Start stepping."""
+        result = super().on_activate(state)
+        # What is there now stays; the collector need not look at it again, in the middle of a tick.
+        gc.collect()
+        gc.freeze()
+        self._set_active(True)
+        if self._stepping is not None:
+            self._stepping.start()
+        self.get_logger().info("active: waiting for muscle/calcium and muscle/length")
+        return result
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stop stepping; the state is kept."""
+        self._halt()
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Forget the fibre and leave the topics."""
+        self._free()
+        return super().on_cleanup(state)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """End; the process follows."""
+        self._halt()
+        self._free()
+        self.finished = True
+        return super().on_shutdown(state)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Back to unconfigured."""
+        self._halt()
+        self._free()
+        return super().on_error(state)
+
+    def _connect(self, fibre: Fibre, muscle: Muscle) -> None:
+        force, moments = (
+            self._outlet(self.create_lifecycle_publisher(JointState, topic, _output_qos(), **_overridable()))
+            for topic in ("muscle/force", "muscle/moments")
+        )
+        emit = OutputMessages(fibre.name, force, moments).publish
+        scale = _scale(fibre)
+        if self._mode == "lockstep":
+            self._stepping = Lockstep(muscle, scale, emit)
+        else:
+            clock = self.get_clock()
+            self._stepping = Realtime(
+                muscle, scale, self._settings(), emit, lambda: int(clock.now().nanoseconds), self.get_logger().error
+            )
+        self._inlet = Inlet(fibre.name, self._stepping, self.get_logger())
+        # Calcium first: where both wait, it is then taken before the length that needs it.
+        for topic, take in (("muscle/calcium", self._inlet.take_calcium), ("muscle/length", self._inlet.take_length)):
+            made = self.create_subscription(JointState, topic, take, _INPUT_QOS[self._mode], **_overridable())
+            self._entities.append((made, self.destroy_subscription))
+        self._reporter.watch(fibre, self._stepping, self._inlet)
+
+    def _outlet(self, publisher: Any) -> Any:
+        self._entities.append((publisher, self.destroy_lifecycle_publisher))
+        return publisher
+
+    def _set_active(self, active: bool) -> None:
+        self._gate.active = active
+        if self._inlet is not None:
+            self._inlet.open = active
+
+    def _halt(self) -> None:
+        self._set_active(False)
+        if self._stepping is not None:
+            self._stepping.stop()
+        gc.unfreeze()
+
+    def _free(self) -> None:
+        for entity, destroy in self._entities:
+            destroy(entity)
+        self._entities.clear()
+        self._reporter.forget()
+        self._stepping = None
+        self._inlet = None
+        self._gate.release()
+
+    def _fail(self, error: UserError) -> TransitionCallbackReturn:
+        self.failure = error
+        if not self._gate.value("autostart"):
+            self.get_logger().error(f"cannot be configured: {error}")
+        self._free()
+        return TransitionCallbackReturn.FAILURE
+
+    def _settings(self) -> Settings:
+        return Settings(*(self._gate.value(name) for name in Settings._fields))
+
+    def _use_settings(self) -> None:
+        if isinstance(self._stepping, Realtime):
+            self._stepping.settings = self._settings()
+
+    def _use_fibre(self, fibre: Fibre) -> None:
+        if self._stepping is not None:
+            # One assignment: a tick sees the old set or the new one, never a mixture.
+            self._stepping.muscle = Muscle(fibre)
+            self._stepping.next_scale = _scale(fibre)
+
+    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self._stepping is None or self._gate.fibre is None:
+            response.message = "the node is not configured; there is nothing to reset"
+            return response
+        account = self._stepping.reset()
+        scale = _scale(self._gate.fibre)
+        response.success = True
+        response.message = (
+            f"state forgotten after {account}; the next length sample settles anew; "
+            f"1 L0 = {scale.reference_length_m:g} m, 1 F0 = {scale.f0_n:g} N"
+        )
+        return response
+
+    def _report(self) -> None:
+        label = self._state_machine.current_state[1]
+        self._reporter.report(label, time.monotonic())
+
+    def _survive_wrong_transitions(self) -> None:
+        """Answer a transition that is not allowed here with failure; rclpy would end the process over it."""
+        service = self._service_change_state
+        answer = service.callback
+
+        def safely(request: Any, response: Any) -> Any:
+            try:
+                return answer(request, response)
+            except Exception as error:
+                self.get_logger().warning(" ".join(f"transition refused: {error}".split()))
+                response.success = False
+                return response
+
+        service.callback = safely
+
+
+def _scale(fibre: Fibre) -> Scale:
+    return Scale(fibre.reference_length_m, fibre.f0_n)
+
+
+def _output_qos() -> QoSProfile:
+    return QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
+
+
+def _overridable() -> dict[str, Any]:
+    kinds = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
+    return {"qos_overriding_options": QoSOverridingOptions(kinds)}

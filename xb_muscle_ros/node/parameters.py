@@ -1,0 +1,142 @@
+"""The node's own parameters, one row each, and the descriptors that ROS tools show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+
+from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS
+
+Value = bool | int | float | str
+
+# When a parameter may be set: at the start of the process only, unconfigured, anything but active, at any time.
+START, UNCONFIGURED, INACTIVE, ALWAYS = "at the start only", "when unconfigured", "when not active", "at any time"
+
+
+class Row(NamedTuple):
+    """One parameter of the node."""
+
+    default: Value
+    unit: str
+    meaning: str
+    when: str
+    lower: float = -math.inf
+    upper: float = math.inf
+    choices: tuple[str, ...] = ()
+
+
+NODE_PARAMETERS: Mapping[str, Row] = MappingProxyType(
+    {
+        "autostart": Row(True, "", "configure and activate without being asked", START),
+        "mode": Row(
+            "realtime",
+            "",
+            "realtime: steps at rate_hz by the steady clock; lockstep: one step per length message, by its stamp",
+            START,
+            choices=("realtime", "lockstep"),
+        ),
+        "fiber_file": Row("", "", "fibre file, path or packaged fibre name; empty: parameters hold it", UNCONFIGURED),
+        "rate_hz": Row(1000.0, "Hz", "steps per second in realtime mode", INACTIVE, 10.0, 10000.0),
+        "extrapolate": Row(
+            False, "", "between length samples go on with their velocity instead of holding the length", ALWAYS
+        ),
+        "extrapolation_limit_s": Row(
+            0.02, "s", "longest time a length sample is carried on by its velocity; held afterwards", ALWAYS, 0.0, 1.0
+        ),
+        "max_catch_up": Row(
+            10, "ticks", "most ticks made up for at once after a late wake-up; more are dropped", ALWAYS, 0, 1000
+        ),
+    }
+)
+
+TEXTS: Mapping[str, str] = MappingProxyType(
+    {
+        "fibre": "name of the fibre, as in the messages",
+        "model": "parameter set in use, one of those under models",
+        "method": "representation of the cross-bridge distribution",
+        "source": "where the values come from",
+    }
+)
+
+# Parameters that rclpy itself declares.
+_FOREIGN = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+
+
+def is_fibre_parameter(name: str) -> bool:
+    """Whether a parameter belongs to the fibre and not to the node or to rclpy."""
+    return name not in NODE_PARAMETERS and not is_foreign(name)
+
+
+def is_foreign(name: str) -> bool:
+    """Whether rclpy itself looks after a parameter."""
+    return name.startswith(_FOREIGN)
+
+
+def check_node_parameter(name: str, value: object) -> Value:
+    """Return a value of the row's type; whole numbers may stand for floating ones.
+
+    Raises:
+        UserError: another type, not finite, out of range, or not among the choices.
+    """
+    row = NODE_PARAMETERS[name]
+    kind = type(row.default)
+    if kind is float and type(value) is int:
+        value = float(value)
+    if type(value) is not kind:
+        raise UserError(f"parameter '{name}' is {value!r}; it takes a {_KINDS[kind]}, for example {row.default!r}")
+    if isinstance(value, str):
+        if row.choices and value not in row.choices:
+            raise UserError(f"parameter '{name}' is '{value}'; allowed is {' or '.join(row.choices)}")
+        return value
+    # A bool is a number too, and within infinite bounds.
+    assert isinstance(value, (bool, int, float))
+    if not row.lower <= value <= row.upper:
+        raise UserError(
+            f"parameter '{name}' is {value:g} {row.unit}; allowed is {row.lower:g} to {row.upper:g} {row.unit} "
+            f"({row.meaning})"
+        )
+    return value
+
+
+_KINDS = {bool: "bool", int: "whole number", float: "number", str: "text"}
+
+
+def unknown(name: str, declared: Iterable[str]) -> UserError:
+    """What to say of a parameter nobody knows."""
+    known = {n for n in declared if not is_foreign(n)} | set(NODE_PARAMETERS) | set(TEXTS)
+    return UserError(f"parameter '{name}' is not known{suggest(name, known)}")
+
+
+def node_descriptor(name: str) -> ParameterDescriptor:
+    """Descriptor of a parameter of the node."""
+    row = NODE_PARAMETERS[name]
+    unit = f" [{row.unit}]" if row.unit else ""
+    descriptor = ParameterDescriptor(description=f"{row.meaning}{unit}; set {row.when}", read_only=row.when == START)
+    if row.choices:
+        descriptor.additional_constraints = f"one of: {', '.join(row.choices)}"
+    if isinstance(row.default, float):
+        descriptor.floating_point_range = [FloatingPointRange(from_value=row.lower, to_value=row.upper)]
+    elif isinstance(row.default, int) and not isinstance(row.default, bool):
+        descriptor.integer_range = [IntegerRange(from_value=int(row.lower), to_value=int(row.upper), step=1)]
+    return descriptor
+
+
+def fibre_descriptor(name: str) -> ParameterDescriptor:
+    """Descriptor of a parameter of the fibre, such as ``models.3state_coop.f``, from the table of all parameters."""
+    if name in TEXTS:
+        return ParameterDescriptor(description=f"{TEXTS[name]}; set {UNCONFIGURED}")
+    head, _, rest = name.partition(".")
+    table, key = (CONSTANTS, rest) if head == "constants" else (PARAMETERS, rest.rpartition(".")[2])
+    when = "takes effect at the next reset" if head == "constants" else f"set {ALWAYS}"
+    if key not in table:
+        raise UserError(f"parameter '{name}' is not known{suggest(key, table)}")
+    row = table[key]
+    return ParameterDescriptor(
+        description=f"{row.meaning} [{row.unit}]; {when}; source: {row.source}",
+        floating_point_range=[FloatingPointRange(from_value=row.lower, to_value=row.upper)],
+    )

@@ -1,0 +1,238 @@
+"""Realtime: one step per period of the steady clock, in a thread of its own, so that messages do not delay ticks."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.errors import StateViolation, UserError
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.node.inputs import (
+    LENGTH_CHANGE_L0,
+    VELOCITY_L0_PER_S,
+    Counts,
+    Scale,
+    after,
+    checked,
+    length_change_l0,
+)
+from xb_muscle_ros.node.lateness import Lateness
+from xb_muscle_ros.node.lockstep import Emit
+from xb_muscle_ros.node.status import Account, Status
+from xb_muscle_ros.node.waiting import make_waiter
+
+# How long another thread may keep the interpreter while a tick waits for it (the default is 5 ms).
+_SWITCH_INTERVAL_S = 1e-4
+
+
+class Settings(NamedTuple):
+    """How the clock drives the fibre; all but the rate may change between ticks."""
+
+    rate_hz: float
+    extrapolate: bool
+    extrapolation_limit_s: float
+    max_catch_up: int
+
+
+class _Length(NamedTuple):
+    change_l0: float
+    velocity_l0_per_s: float | None
+    arrival_ns: int
+
+
+class Realtime:
+    """Steps at absolute deadlines; between samples the length is held, or carried on by its velocity.
+
+    Callbacks put the newest input in place, the thread takes it from there; each is one reference, so neither waits for
+    the other.
+
+    Attributes:
+        muscle: what is stepped; may be exchanged between ticks for one of the same model.
+        settings: may be exchanged between ticks; the rate counts at the next start.
+        next_scale: becomes the scale in use at the next reset.
+        counts: what was odd about the input that was taken nevertheless.
+    """
+
+    def __init__(
+        self,
+        muscle: Muscle,
+        scale: Scale,
+        settings: Settings,
+        emit: Emit,
+        clock_ns: Callable[[], int],
+        complain: Callable[[str], None],
+    ) -> None:
+        """Keep what is needed; `start` starts.
+
+        Args:
+            muscle, scale, settings: see above.
+            emit: called in the thread with stamp, outputs and scale.
+            clock_ns: time of the output's stamps, ns.
+            complain: called in the thread once when stepping stops.
+        """
+        self.muscle = muscle
+        self.settings = settings
+        self.next_scale = scale
+        self.counts = Counts()
+        self._emit = emit
+        self._clock_ns = clock_ns
+        self._complain = complain
+        self._thread: threading.Thread | None = None
+        self._stop = False
+        self._ticks = 0
+        self._violations = 0
+        self._calcium: float | None = None
+        self._account = Account()
+        self.reset()
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._stop = False
+        self._switch_interval = sys.getswitchinterval()
+        sys.setswitchinterval(_SWITCH_INTERVAL_S)
+        self._thread = threading.Thread(target=self._run, name="ticks", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread at its next tick, and wait for that."""
+        if self._thread is not None:
+            self._stop = True
+            self._thread.join()
+            self._thread = None
+            sys.setswitchinterval(self._switch_interval)
+
+    def reset(self) -> Account:
+        """Forget state and stamps and start the statistics anew; the next length sample settles anew.
+
+        The newest calcium is kept: it holds whatever the clock of the samples says. Returns what was taken until now.
+        """
+        account, self._account = self._account, Account()
+        self._length: _Length | None = None
+        self._length_stamp: int | None = None
+        self._calcium_stamp: int | None = None
+        self._scale = self.next_scale
+        # The thread takes the rest up at its next tick.
+        self._reset = True
+        if self._thread is None:
+            self._begin_anew()
+        return account
+
+    def take_calcium(self, stamp: int, calcium_um: float) -> None:
+        """Use a calcium sample (µM) from the next tick on; a stamp of 0 stands for an unstamped message.
+
+        Raises:
+            Refusal: the stamp is not after the last one.
+        """
+        if stamp != 0:
+            self._calcium_stamp = after(stamp, self._calcium_stamp, "calcium")
+        self._calcium = calcium_um
+        self._account = self._account._replace(calcium=self._account.calcium + 1)
+
+    def take_length(self, stamp: int, position_m: float, velocity_m_per_s: float | None) -> None:
+        """Use a length sample (m, m/s or None) from the next tick on; a stamp of 0 stands for an unstamped message.
+
+        Raises:
+            Refusal: the sample cannot be integrated.
+        """
+        change = length_change_l0(position_m, self._scale)
+        velocity = None
+        if velocity_m_per_s is not None:
+            velocity = checked(velocity_m_per_s / self._scale.reference_length_m, VELOCITY_L0_PER_S, "velocity", "L0/s")
+        if stamp != 0:
+            self._length_stamp = after(stamp, self._length_stamp, "length")
+        self._length = _Length(change, velocity, time.monotonic_ns())
+        self._account = self._account._replace(length=self._account.length + 1)
+
+    def status(self) -> Status:
+        """How it goes."""
+        waiting = ""
+        if self._state is None:
+            missing = [n for n, v in (("length", self._length), ("calcium", self._calcium)) if v is None]
+            waiting = f"waiting for {' and '.join(missing)}" if missing else "settling"
+        return Status(
+            self._ticks,
+            self._violations,
+            self._fault,
+            waiting,
+            self._lateness.summary(),
+            self._overruns,
+            self._dropped,
+        )
+
+    def _begin_anew(self) -> None:
+        self._reset = False
+        self._scale_out = self._scale
+        self._state: npt.NDArray[np.float64] | None = None
+        self._fault = ""
+        self._lateness = Lateness()
+        self._overruns = 0
+        self._dropped = 0
+
+    def _run(self) -> None:
+        wait = make_waiter()
+        period = round(1e9 / self.settings.rate_hz)
+        self._dt = period * 1e-9
+        deadline = time.monotonic_ns() + period
+        while not self._stop:
+            wait(deadline)
+            if self._reset:
+                self._begin_anew()
+            if self._state is None or self._fault:
+                self._settle()
+                # Settling takes as long as it takes; ticks count from its end.
+                deadline = time.monotonic_ns() + period
+                continue
+            late = time.monotonic_ns() - deadline
+            missed = late // period
+            made_up = min(missed, self.settings.max_catch_up)
+            self._overruns += missed
+            self._dropped += missed - made_up
+            for i in range(made_up + 1):
+                self._lateness.note(late - i * period)
+                self._tick(deadline + i * period)
+            if not self._fault:
+                # Of ticks made up for only the newest is worth sending.
+                self._emit(self._clock_ns(), self.muscle.outputs(self._state), self._scale_out)
+            deadline += (missed + 1) * period
+
+    def _settle(self) -> None:
+        length, calcium = self._length, self._calcium
+        if self._fault or length is None or calcium is None:
+            return
+        try:
+            self._state = self.muscle.settle(length.change_l0, calcium)
+        except UserError as error:
+            self._fail(error)
+
+    def _tick(self, deadline_ns: int) -> None:
+        length, calcium = self._length, self._calcium
+        # Just after a reset there is no new length yet; the reset is taken up at the next tick.
+        if self._fault or self._state is None or length is None or calcium is None:
+            return
+        change = self._change_at(length, deadline_ns)
+        try:
+            self._state = self.muscle.step(self._state, change, calcium, self._dt)
+        except UserError as error:
+            self._fail(error)
+        self._ticks += 1
+
+    def _change_at(self, length: _Length, time_ns: int) -> float:
+        settings = self.settings
+        if not settings.extrapolate or length.velocity_l0_per_s is None:
+            return length.change_l0
+        ahead = min(max((time_ns - length.arrival_ns) * 1e-9, 0.0), settings.extrapolation_limit_s)
+        change = length.change_l0 + length.velocity_l0_per_s * ahead
+        # Where the velocity would lead out of what is allowed, the sample itself is the better guess.
+        return change if LENGTH_CHANGE_L0[0] <= change <= LENGTH_CHANGE_L0[1] else length.change_l0
+
+    def _fail(self, error: UserError) -> None:
+        if isinstance(error, StateViolation):
+            self._violations += 1
+        self._fault = f"{error} (after {self._ticks * self._dt:.3f} s of stepping)"
+        self._complain(self._fault)

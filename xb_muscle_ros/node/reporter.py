@@ -1,0 +1,60 @@
+"""Gathers the node's account and publishes it."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.node.diagnostics import Report, diagnostics
+from xb_muscle_ros.node.inlet import Inlet
+from xb_muscle_ros.node.lockstep import Lockstep
+from xb_muscle_ros.node.realtime import Realtime
+
+
+class Reporter:
+    """Publishes ``/diagnostics``; rates are those since the last report."""
+
+    def __init__(self, node: Any, mode: str) -> None:
+        self._node = node
+        self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._mode = mode
+        self._report = Report(node.get_fully_qualified_name(), mode, "unconfigured")
+        self._stepping: Lockstep | Realtime | None = None
+        self._inlet: Inlet | None = None
+        self._last = (time.monotonic(), time.process_time(), 0, 0)
+
+    def watch(self, fibre: Fibre, stepping: Lockstep | Realtime, inlet: Inlet) -> None:
+        """Report on these from now on."""
+        self._report.fibre, self._report.model = fibre.name, fibre.model
+        self._stepping, self._inlet = stepping, inlet
+        self._report.refused, self._report.odd = inlet.refused, stepping.counts
+
+    def forget(self) -> None:
+        """There is nothing to report on but the node itself."""
+        self._stepping = self._inlet = None
+        self._report = Report(self._report.node, self._mode, "unconfigured")
+
+    def report(self, state: str, now_s: float) -> None:
+        """Publish once; `now_s` is steady time."""
+        report = self._report
+        report.state = state
+        report.status = self._stepping.status() if self._stepping is not None else None
+        ticks = report.status.ticks if report.status else 0
+        overruns = report.status.overruns if report.status else 0
+        then, cpu_then, ticks_then, overruns_then = self._last
+        cpu = time.process_time()
+        self._last = (now_s, cpu, ticks, overruns)
+        elapsed = max(now_s - then, 1e-6)
+        report.rate_hz = max(ticks - ticks_then, 0) / elapsed
+        report.cpu_share = (cpu - cpu_then) / elapsed
+        report.overruns_new = max(overruns - overruns_then, 0)
+        if self._inlet is not None:
+            report.ignored_names = self._inlet.ignored_names
+            last = self._inlet.last_length_s
+            report.input_age_s = None if last is None else now_s - last
+        message = diagnostics(report)
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
