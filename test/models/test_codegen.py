@@ -66,15 +66,20 @@ def test_compiled_right_hand_side_is_the_blocks_own(
     values |= {e.symbols[name]: value for name, value in muscle.fibre.values.items()}
     values |= {e.shift: z[5], e.symbols["velocity"]: velocity, e.symbols["calcium"]: calcium}
     from xb_muscle_ros.mechanisms import ops
-    from xb_muscle_ros.models.symbols import Logistic, Positive, Softplus
+    from xb_muscle_ros.models.symbols import Decay, Logistic, Positive, Softplus
 
     ours = np.zeros(6)
     muscle.code.rhs(z, velocity, calcium, muscle.parameters, ours)
     plain = [
-        {"Softplus": ops.softplus, "Positive": ops.positive, "Logistic": lambda v: 1.0 / (1.0 + np.exp(-v))},
+        {
+            "Decay": lambda v: 0.0,
+            "Softplus": lambda v, k, _: ops.softplus(v, k),
+            "Logistic": lambda v, _: 1.0 / (1.0 + np.exp(-v)),
+            "Positive": ops.positive,
+        },
         "math",
     ]
-    assert {Softplus.__name__, Positive.__name__, Logistic.__name__} == set(plain[0])
+    assert {f.__name__ for f in (Decay, Softplus, Positive, Logistic)} == set(plain[0])
     symbols = list(values)
     theirs = sympy.lambdify(symbols, e.derivatives[:-1], plain)(*(float(v) for v in values.values()))
     np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * max(1.0, float(np.abs(theirs).max())))

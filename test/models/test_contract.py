@@ -215,10 +215,9 @@ def test_a_grid_that_may_not_follow_says_when_it_is_left(muscle: Muscle) -> None
         return
     fibre = fibre_for(muscle.fibre.model, "characteristics", 0.0)
     stuck = Muscle(Fibre(**{**fibre.__dict__, "values": {**fibre.values, "regrid": 0.0}}))
-    state = stuck.settle(0.0, 3.0)
+    start, length = stuck.settle(0.0, 3.0), 0.001 * np.arange(200)
     with pytest.raises(StateViolation, match="grid_shift"):
-        for k in range(200):
-            state = stuck.step(state, 0.001 * k, 3.0, 2e-3)
+        stuck.run(start, np.full(199, 2e-3), length, np.full(200, 3.0))
 
 
 def test_calcium_jump_from_rest_at_full_calcium_and_1_ms(muscle: Muscle) -> None:

@@ -67,9 +67,9 @@ def softplus(z: Expr, sharpness: Expr) -> Expr:
     """Smooth positive part ln(1 + exp(sharpness z))/sharpness, in the unit of z."""
     if _numeric(z, sharpness):
         return max(z, 0.0) + math.log1p(math.exp(-abs(sharpness * z))) / sharpness
-    from xb_muscle_ros.models.symbols import Softplus
+    from xb_muscle_ros.models.symbols import Decay, Softplus
 
-    return Softplus(z, sharpness)
+    return Softplus(z, sharpness, Decay(sharpness * z))
 
 
 def positive(z: Expr) -> Expr:

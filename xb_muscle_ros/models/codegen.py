@@ -22,6 +22,7 @@ import numpy as np
 from numba import get_thread_id, njit, prange
 
 from xb_muscle_ros.models.intrinsics import (
+    decay,
     hyperbolic_tangent,
     logistic,
     positive_part,

@@ -9,27 +9,30 @@ from numba import njit
 
 # exp(-36.8) is half a unit in the last place of 1: past it, the saturated form is the exact double.
 _SATURATED = 36.8
+# Below it, ln(1 + t) = t - t²/2 to the last digit of what it is added to.
+_SMALL = 1e-8
 
 
 @njit(cache=True)
-def logistic(z: float) -> float:
-    """1/(1 + exp(-z)); its first branch saves the exponential where activation is well above zero."""
-    if z > _SATURATED:
-        return 1.0
-    if z < -700.0:
-        return 0.0
-    return 1.0 / (1.0 + math.exp(-z))
+def decay(z: float) -> float:
+    """exp(-|z|), 0 where nothing would come of it: that saves the exponential where activation is well above zero."""
+    size = abs(z)
+    return 0.0 if size > _SATURATED and z > 0.0 else math.exp(-size)
 
 
 @njit(cache=True)
-def softplus(z: float, k: float) -> float:
-    """ln(1 + exp(k z))/k without overflow."""
-    kz = k * z
-    if kz > _SATURATED:
-        return z
-    if kz > 0.0:
-        return z + math.log1p(math.exp(-kz)) / k
-    return math.log1p(math.exp(kz)) / k
+def logistic(z: float, t: float) -> float:
+    """1/(1 + exp(-z)), given t = decay(z)."""
+    return (1.0 if z > 0.0 else t) / (1.0 + t)
+
+
+@njit(cache=True)
+def softplus(z: float, k: float, t: float) -> float:
+    """ln(1 + exp(k z))/k without overflow, given t = decay(k z)."""
+    above = z if z > 0.0 else 0.0
+    if t < _SMALL:
+        return above + t * (1.0 - 0.5 * t) / k
+    return above + math.log1p(t) / k
 
 
 @njit(cache=True)
@@ -82,16 +85,15 @@ def smooth_series_extension(force: float, c: float, k: float) -> float:
 
 
 C_SOURCE = """
-static inline double logistic(double z) {
-    if (z > 36.8) return 1.0;
-    if (z < -700.0) return 0.0;
-    return 1.0 / (1.0 + exp(-z));
+static inline double decay(double z) {
+    double size = fabs(z);
+    return size > 36.8 && z > 0.0 ? 0.0 : exp(-size);
 }
-static inline double softplus(double z, double k) {
-    double kz = k * z;
-    if (kz > 36.8) return z;
-    if (kz > 0.0) return z + log1p(exp(-kz)) / k;
-    return log1p(exp(kz)) / k;
+static inline double logistic(double z, double t) { return (z > 0.0 ? 1.0 : t) / (1.0 + t); }
+static inline double softplus(double z, double k, double t) {
+    double above = z > 0.0 ? z : 0.0;
+    if (t < 1e-8) return above + t * (1.0 - 0.5 * t) / k;
+    return above + log1p(t) / k;
 }
 static inline double unit_step(double z) { return z > 0.0 ? 1.0 : 0.0; }
 static inline double positive_part(double z) { return z < 0.0 ? 0.0 : z; }

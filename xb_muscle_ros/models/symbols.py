@@ -7,27 +7,35 @@ from typing import Any
 import sympy
 
 
-class Logistic(sympy.Function):
-    """1/(1 + exp(-z))."""
+class Decay(sympy.Function):
+    """exp(-|z|): what softplus and its derivative share."""
 
     nargs = 1
 
-    def fdiff(self, argindex: int = 1) -> Any:
-        """d/dz."""
-        return self * (1 - self)
 
-
-class Softplus(sympy.Function):
-    """ln(1 + exp(k z))/k; arguments z and k, both of them differentiable."""
+class Logistic(sympy.Function):
+    """1/(1 + exp(-z)); arguments z and exp(-|z|), which was computed before."""
 
     nargs = 2
 
     def fdiff(self, argindex: int = 1) -> Any:
-        """d/dz, or d/dk."""
-        z, k = self.args
+        """d/dz; the second argument follows the first."""
+        return self * (1 - self) if argindex == 1 else sympy.Integer(0)
+
+
+class Softplus(sympy.Function):
+    """ln(1 + exp(k z))/k; arguments z, k and exp(-|k z|), which was computed before."""
+
+    nargs = 3
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        """d/dz or d/dk; the third argument follows the others."""
+        z, k, decay = self.args
         if argindex == 1:
-            return Logistic(k * z)
-        return (z * Logistic(k * z) - self) / k
+            return Logistic(k * z, decay)
+        if argindex == 2:
+            return (z * Logistic(k * z, decay) - self) / k
+        return sympy.Integer(0)
 
 
 class UnitStep(sympy.Function):
@@ -52,6 +60,7 @@ class Positive(sympy.Function):
 
 # Printed as calls of these names, in Python and in C alike.
 CALLS = {
+    "Decay": "decay",
     "Logistic": "logistic",
     "Softplus": "softplus",
     "UnitStep": "unit_step",
