@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Quantities
+from xb_muscle_ros.mechanisms.base import GaussianSpread, Quantities, StepRate
+from xb_muscle_ros.mechanisms.detachment.forcible import ForcibleDetachment
+from xb_muscle_ros.mechanisms.parallel.softplus import SoftplusParallel
 from xb_muscle_ros.mechanisms.series.exponential import ExponentialSeries
 from xb_muscle_ros.mechanisms.thick_filament.force_dependent import ForceDependentThickFilament
 from xb_muscle_ros.mechanisms.thin_filament.cooperative import CooperativeThinFilament
@@ -35,6 +39,25 @@ def test_thick_filament_by_hand() -> None:
     # 6*(1+100*0.35)*(1-0.3-0.2-0.1) - 200*0.2 - 1.5 = 86.4 - 40 - 1.5
     assert ForceDependentThickFilament().derivatives(q)["drx"] == pytest.approx(44.9)
     assert ForceDependentThickFilament().rest(q)["drx"] == pytest.approx(6.0 / 206.0)
+
+
+def test_forcible_detachment_by_hand() -> None:
+    values = {"k": 1000.0, "b": 3000.0, "dLcrit": 2.0, "steepness": 3.0, "r": 0.1, "w": 0.3}
+    q = Quantities({**values, "torn_off": 40.0, "reattached": 300.0}, "forcible", None)
+    block = ForcibleDetachment()
+    assert block.forcible_rates(q) == (StepRate(1000.0, 2.0, 3.0),)
+    assert block.reattachment(q) == (GaussianSpread(pytest.approx(300.0), 0.3),)
+    assert block.derivatives(q) == {"r": -260.0}
+    assert block.forcibly_detached(q) == 0.1
+
+
+def test_softplus_parallel_spring_is_half_a_sharpness_wide() -> None:
+    block = SoftplusParallel()
+    at = {"kpe": 0.002, "gamma": 130.0, "lpe0": 0.02, "pe_sharpness": 100.0}
+    force = [block.force(Quantities({**at, "length_change": x}, "softplus", None)) for x in (-0.3, 0.02, 0.5)]
+    assert force[0] == pytest.approx(0.0, abs=1e-14)
+    assert force[1] == pytest.approx(0.26 * math.log(2.0) / 100.0)
+    assert force[2] == pytest.approx(0.26 * 0.48)
 
 
 def test_series_velocity_keeps_the_force_balance() -> None:

@@ -72,9 +72,9 @@ def test_compiled_right_hand_side_is_the_blocks_own(
     muscle.code.rhs(z, velocity, calcium, muscle.parameters, ours)
     plain = [
         {
-            "Decay": lambda v: 0.0,
+            "Decay": lambda v, k: 0.0,
             "Softplus": lambda v, k, _: ops.softplus(v, k),
-            "Logistic": lambda v, _: 1.0 / (1.0 + np.exp(-v)),
+            "Logistic": lambda v, k, _: 1.0 / (1.0 + np.exp(-k * v)),
             "Positive": ops.positive,
         },
         "math",

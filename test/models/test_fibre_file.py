@@ -13,9 +13,16 @@ from hypothesis import strategies as st
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import fibre_from_parameters, find_fibre_file, load_fibre
 from xb_muscle_ros.models.parameters import PARAMETERS
+from xb_muscle_ros.models.registry import BASE_OF, model_of_set
 
 FIBRES = ("13Dec2017a", "13Dec2017b", "14Dec2017b", "18Dec2017a", "18Dec2017b", "19Dec2017a", "7Aug2018a")
-SETS = {"3state_coop": "3state_coop", "3state_coop_v3": "3state_coop_v3", "2state": "2state_xb"}
+SETS = {
+    "3state_coop": "3state_coop",
+    "3state_coop_v3": "3state_coop_v3",
+    "2state": "2state_xb",
+    "4state_coop": "4state_coop",
+    "hill_se": "hill_se",
+}
 
 
 @pytest.mark.parametrize("fibre", FIBRES)
@@ -24,8 +31,11 @@ def test_shipped_values_are_the_released_ones(shared_data: Path, fibre: str, mod
     released = json.loads((shared_data / "parameters.json").read_text())[SETS[model]][fibre]
     values = dict(load_fibre(fibre, model).values)
     assert values.pop("smoothing") == released["K"] == 100.0
-    assert values.pop("smooth_stiffness") == (1.0 if model.endswith("_v3") else 0.0)
-    values.pop("tau_act", None)
+    assert values.pop("smooth_stiffness") == (1.0 if model in ("3state_coop_v3", "4state_coop") else 0.0)
+    assert values.pop("tau_act", 0.005) == 0.005
+    assert values.pop("steepness", 3.0) == 3.0
+    if model == "hill_se":
+        assert [values.pop(name) for name in ("e1", "e2", "e3", "e4")] == released["e"]
     assert values == {name: released[name] for name in values}
 
 
@@ -34,7 +44,7 @@ def test_defaults_and_contents(fibre: str) -> None:
     loaded = load_fibre(fibre)
     assert loaded.name == fibre
     assert loaded.model == "3state_coop"
-    assert set(SETS) <= set(loaded.available_models)
+    assert set(loaded.available_models) == set(SETS)
     assert "van der Zee" in loaded.source
 
 
@@ -67,7 +77,20 @@ def text(**changes: object) -> str:
         ({"models__3state_cop": {"f": 1.0}}, "'3state_cop' is not known; did you mean '3state_coop'?"),
         ({"modell": "3state_coop"}, "'modell' is not known; did you mean 'model'?"),
         ({"model": "2state_coop"}, "model '2state_coop' has no parameter set here; there are 2state, 3state_coop"),
+        (
+            {"model": "2state_coop_rigid"},
+            "'2state_coop_rigid' has no parameter set here, nor has '2state_coop'; there are",
+        ),
+        (
+            {"model": "3state_coop_rigid_v9"},
+            "'3state_coop_rigid_v9' has no parameter set here, nor has '3state_coop_v9'",
+        ),
         ({"model": "4state"}, "model '4state' is not known"),
+        ({"model": "3state_coop_v3_rigid"}, "'3state_coop_v3_rigid' is not known; did you mean '3state_coop_rigid'?"),
+        (
+            {"models__3state_coop_rigid": {"kse": 0.3}, "model": "3state_coop_rigid"},
+            "model 3state_coop_rigid has no parameter 'kse'",
+        ),
         ({"method": "gausian"}, "'gausian' is not known; did you mean 'gaussian'?"),
         ({"fibre": None}, "'fibre' is missing"),
         ({"constants__f0_n": 0.0}, "'f0_n' is 0 N"),
@@ -91,6 +114,46 @@ def test_malformed_files_are_one_line(tmp_path: Path, content: str) -> None:
     with pytest.raises(UserError) as caught:
         load_fibre(file)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("variant", "base", "left_out", "added"),
+    [
+        ("3state_coop_rigid", "3state_coop", {"kse", "kse0", "smooth_stiffness"}, {}),
+        ("3state_coop_softplus", "3state_coop", {"Fpe0"}, {"lpe0": 0.0, "pe_sharpness": 100.0}),
+        ("3state_coop_rigid_v3", "3state_coop_v3", {"kse", "kse0", "smooth_stiffness"}, {}),
+        (
+            "2state_rigid_softplus",
+            "2state",
+            {"kse", "kse0", "smooth_stiffness", "Fpe0"},
+            {"lpe0": 0.0, "pe_sharpness": 100.0},
+        ),
+        ("hill", "hill_se", {"kse", "kse0", "smooth_stiffness"}, {}),
+        (
+            "hill_softplus",
+            "hill_se",
+            {"kse", "kse0", "smooth_stiffness", "Fpe0"},
+            {"lpe0": 0.0, "pe_sharpness": 100.0},
+        ),
+    ],
+    ids=lambda x: x if isinstance(x, str) else "",
+)
+def test_variants_use_the_set_of_their_base(
+    variant: str, base: str, left_out: set[str], added: dict[str, float]
+) -> None:
+    fibre = load_fibre("18Dec2017a", variant)
+    wanted = {k: v for k, v in load_fibre("18Dec2017a", base).values.items() if k not in left_out}
+    assert dict(fibre.values) == {**wanted, **added}
+    assert fibre.model == variant
+    assert set(fibre.available_models) == set(SETS)
+
+
+def test_a_variants_own_set_needs_to_name_what_differs_only(tmp_path: Path) -> None:
+    file = tmp_path / "fibre.yaml"
+    file.write_text(text(models__3state_coop_softplus={"lpe0": 0.02, "f": 60.0}))
+    values = load_fibre(file, "3state_coop_softplus").values
+    assert (values["lpe0"], values["f"]) == (0.02, 60.0)
+    assert values["kon"] == load_fibre(file, "3state_coop").values["kon"]
 
 
 def test_unknown_fibre_suggests_the_nearest() -> None:
@@ -117,7 +180,7 @@ def test_any_parameters_either_make_a_fibre_or_a_user_error(parameters: dict[str
         lines = str(error).count("\n")
     else:
         lines = 0
-        assert fibre.model in fibre.available_models
+        assert BASE_OF[model_of_set(fibre.model)] in {model_of_set(name) for name in fibre.available_models}
     assert lines == 0
 
 

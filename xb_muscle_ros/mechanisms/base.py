@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import enum
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import ClassVar, NamedTuple
 
 from xb_muscle_ros.mechanisms.ops import Expr
@@ -25,6 +25,8 @@ class Family(enum.Enum):
     SERIES = "series"
     PARALLEL = "parallel"
     EXTRA = "extra"
+    ACTIVATION = "activation"
+    FORCE_VELOCITY = "force_velocity"
 
 
 class Parameter(NamedTuple):
@@ -76,8 +78,20 @@ class ExponentialRate(NamedTuple):
     slope: Expr
 
 
+class StepRate(NamedTuple):
+    """A detachment rate in 1/s that sets in at a strain.
+
+    Over a distribution ``height (1 + tanh(steepness (x - threshold)))/2``, x and threshold in power strokes, steepness
+    per power stroke. The closed moments know its sharp limit only: ``height`` above the threshold, nothing below.
+    """
+
+    height: Expr
+    threshold: Expr
+    steepness: Expr
+
+
 # The kinds of strain dependence; a representation knows the moments of each.
-StrainRate = ExponentialRate
+StrainRate = ExponentialRate | StepRate
 
 
 class GaussianSpread(NamedTuple):
@@ -236,10 +250,43 @@ class Detachment(Mechanism):
         return {}
 
 
+class Contractile(NamedTuple):
+    """A contractile element whose force is a function of its velocity alone.
+
+    Attributes:
+        force_at: cross-bridge force at a velocity in power strokes/s.
+        velocity_at: the inverse.
+    """
+
+    force_at: Callable[[Expr], Expr]
+    velocity_at: Callable[[Expr], Expr]
+
+
+class Balance(NamedTuple):
+    """Where such an element and the series element bear the same force.
+
+    Attributes:
+        force: cross-bridge force.
+        ce_velocity: of the contractile element, power strokes/s.
+        extension: of the series element, power strokes.
+        derivatives: rates of the series element's `length_states`.
+    """
+
+    force: Expr
+    ce_velocity: Expr
+    extension: Expr
+    derivatives: Mapping[str, Expr]
+
+
 class Series(Mechanism):
-    """What lies between the cross-bridges and the end of the fibre."""
+    """What lies between the contractile element and the end of the fibre.
+
+    Cross-bridges carry the force in their states: `ce_velocity` and `extension` follow from it. Where the contractile
+    element has no such state, the series element's own length is one (`length_states`), and `balance` applies.
+    """
 
     family = Family.SERIES
+    length_states: ClassVar[tuple[State, ...]] = ()
 
     @abstractmethod
     def ce_velocity(self, q: Quantities) -> Expr:
@@ -251,6 +298,10 @@ class Series(Mechanism):
     @abstractmethod
     def extension(self, q: Quantities) -> Expr:
         """Length of the series element at the force ``q.force_xb``, power strokes."""
+
+    @abstractmethod
+    def balance(self, q: Quantities, element: Contractile) -> Balance:
+        """Force and velocity of a contractile element without states of its own."""
 
 
 class Parallel(Mechanism):

@@ -63,13 +63,48 @@ def erf(z: Expr) -> Expr:
     return sympy.erf(z)
 
 
+def asinh(z: Expr) -> Expr:
+    """Inverse hyperbolic sine, ln(z + sqrt(z² + 1))."""
+    if _numeric(z):
+        return math.asinh(z)
+    import sympy
+
+    return sympy.asinh(z)
+
+
+def tangent_sinh(z: Expr) -> Expr:
+    """Hyperbolic sine up to |z| = 12, its tangent there beyond."""
+    if _numeric(z):
+        from xb_muscle_ros.models.intrinsics import tangent_sinh as compute
+
+        return float(compute(z))
+    from xb_muscle_ros.models.symbols import TangentSinh
+
+    return TangentSinh(z)
+
+
+def deviation(variance: Expr) -> Expr:
+    """Standard deviation of a variance that numerical error may have carried to zero or below.
+
+    The root of (v + sqrt(v² + 4e-12))/2: sqrt(v) to six digits from v = 1e-3 on, 1e-3 at zero, and still smooth and
+    positive, but vanishing, below.
+    """
+    if _numeric(variance):
+        from xb_muscle_ros.models.intrinsics import deviation as compute
+
+        return float(compute(variance))
+    from xb_muscle_ros.models.symbols import Deviation
+
+    return Deviation(variance)
+
+
 def softplus(z: Expr, sharpness: Expr) -> Expr:
     """Smooth positive part ln(1 + exp(sharpness z))/sharpness, in the unit of z."""
     if _numeric(z, sharpness):
         return max(z, 0.0) + math.log1p(math.exp(-abs(sharpness * z))) / sharpness
     from xb_muscle_ros.models.symbols import Decay, Softplus
 
-    return Softplus(z, sharpness, Decay(sharpness * z))
+    return Softplus(z, sharpness, Decay(z, sharpness))
 
 
 def positive(z: Expr) -> Expr:

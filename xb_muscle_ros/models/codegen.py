@@ -9,7 +9,7 @@ from typing import Any
 import sympy
 
 from xb_muscle_ros.mechanisms.base import Parameter
-from xb_muscle_ros.models.composition import INPUTS, OUTPUTS, Composition, Equations, equations
+from xb_muscle_ros.models.composition import INPUTS, OUTPUTS, Equations, Model
 from xb_muscle_ros.models.elimination import Elimination
 from xb_muscle_ros.models.program import Program, c, jacobian, program, python
 from xb_muscle_ros.stepping import rodas3
@@ -23,37 +23,42 @@ from numba import get_thread_id, njit, prange
 
 from xb_muscle_ros.models.intrinsics import (
     decay,
+    deviation,
     hyperbolic_tangent,
     logistic,
     positive_part,
     smooth_series_extension,
     softplus,
+    tangent_cosh,
+    tangent_sinh,
     unit_step,
 )
 '''
+# How wrong a moment may be relative to the heads attached, as a multiple of the tolerance: 1/0.01.
+_SHARE_OF_HEADS = 0.01
 _JIT = '@njit(cache=True, error_model="numpy")'
 
 
-def module_text(model: Composition, smooth: bool) -> str:
+def module_text(model: Model, smooth: bool) -> str:
     """Text of the module that steps a model.
 
     Args:
         model: the composition.
         smooth: with the released sets' smooth functions, or exact.
     """
-    return model.representation.module_text(model, smooth)
+    return model.module_text(smooth)
 
 
-def header(model: Composition, smooth: bool, order: int) -> str:
+def header(model: Model, smooth: bool, order: int) -> str:
     """Head of a generated module: imports, and the constants that the loops of `stepping.kernels` use."""
     head = _HEADER.format(name=model.name, smooth=" with smooth functions" if smooth else "")
     codes = "OK, NOT_FINITE, OUT_OF_BOUNDS, TOO_MANY_STEPS = 0, 1, 2, 3\nMAX_ATTEMPTS = 20000\n"
     return f"{head}\n\n{codes}EXPONENT = {1.0 / order!r}\nORDER = {order}\nOUTPUTS = {OUTPUTS!r}\n"
 
 
-def flat_module(model: Composition, smooth: bool) -> str:
+def flat_module(model: Model, smooth: bool) -> str:
     """A model whose every state is a symbol: one flat right-hand side, one flat Rosenbrock step."""
-    e = equations(model, smooth)
+    e = model.equations(smooth)
     prepare = function("prepare(p)", "Parameters and what is computed from them once.", ["return p.copy()"])
     stay = function("regrid(s, p, work)", "Moments need no grid.", ["pass"])
     parts = [header(model, smooth, rodas3.ORDER), prepare, stay, _rhs(e), _attempt(e), _slope(e)]
@@ -61,11 +66,11 @@ def flat_module(model: Composition, smooth: bool) -> str:
     return "\n\n".join(parts) + "\n\n\n" + kernels() + "\n"
 
 
-def c_text(model: Composition, smooth: bool) -> str:
+def c_text(model: Model, smooth: bool) -> str:
     """The same right-hand side in C, for comparison: `void rhs(const double *z, double velocity, ...)`."""
     from xb_muscle_ros.models.intrinsics import C_SOURCE
 
-    e = equations(model, smooth)
+    e = model.equations(smooth)
     lines = _scalars(e, "z", c_style=True)
     body = program(e.derivatives[:-1], "t")
     lines += [f"double {s} = {c(x)};" for s, x in body.lines]
@@ -170,6 +175,11 @@ def _attempt(e: Equations) -> str:
     lines += ["error = 0.0"]
     for i in range(n):
         lines.append(f"error = max(error, abs(e_{i}) / (1.0 + abs(y_{i})))")
+    if e.shares:
+        # With few heads attached their mean strain and its variance are quotients of small numbers: an error that is
+        # nothing to the force could still make the variance negative, and with it the detachment rates nonsense.
+        lines.append(f"share = {_SHARE_OF_HEADS!r} / (abs(y_{names.index(e.shares[0])}) + 1e-6)")
+        lines += [f"error = max(error, abs(e_{names.index(name)}) * share)" for name in e.shares]
     lines += ["return error if error == error else math.inf"]
     doc = "One Rosenbrock step of h seconds; returns the largest embedded error."
     return function("attempt(s, h, velocity, calcium, p, out, work)", doc, lines)

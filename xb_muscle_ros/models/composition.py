@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from xb_muscle_ros.distribution.base import Moments, Representation, Ways
+from xb_muscle_ros.distribution.base import Moments, Representation, Settling, Ways
 from xb_muscle_ros.mechanisms.base import (
     Attachment,
     Detachment,
@@ -47,8 +48,53 @@ OUTPUTS = (
 )  # fmt: skip
 
 
+class Model(ABC):
+    """Blocks and the one set of equations that they make: what stepping, files and node know of a model.
+
+    Attributes:
+        name: unique among generated modules.
+    """
+
+    name: str
+
+    @property
+    @abstractmethod
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Rows of the parameter table that this model needs, without repeats."""
+
+    @property
+    @abstractmethod
+    def states(self) -> tuple[State, ...]:
+        """States that every copy of the model integrates, without the inputs."""
+
+    def state_rows(self, values: Mapping[str, float]) -> tuple[State, ...]:
+        """The integrated states with these parameter values, in order; a strain grid adds its bins."""
+        return self.states
+
+    @property
+    def settling(self) -> Settling:
+        """How a fibre is brought to rest."""
+        return Representation.settling
+
+    @abstractmethod
+    def equations(self, smooth: bool) -> Equations:
+        """Write the model out; `smooth` picks the released sets' smooth functions."""
+
+    @abstractmethod
+    def module_text(self, smooth: bool) -> str:
+        """Text of the module that steps the model: see `models.codegen`."""
+
+
+def distinct(rows: Iterable[Parameter]) -> tuple[Parameter, ...]:
+    """Parameters without repeats, in order; blocks may share them."""
+    found: dict[str, Parameter] = {}
+    for row in rows:
+        found.setdefault(row.name, row)
+    return tuple(found.values())
+
+
 @dataclass(frozen=True)
-class Composition:
+class Composition(Model):
     """One block of each family and a representation of the strain distribution."""
 
     name: str
@@ -75,16 +121,30 @@ class Composition:
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Rows of the parameter table that this model needs, without repeats."""
-        rows: dict[str, Parameter] = {}
         blocks = (p for block in self.blocks for p in block.parameters)
-        for row in (*blocks, *COMMON, *self.representation.parameters):
-            rows.setdefault(row.name, row)
-        return tuple(rows.values())
+        return distinct((*blocks, *COMMON, *self.representation.parameters))
 
     @property
     def states(self) -> tuple[State, ...]:
         """States that are integrated, moments first, without the inputs."""
         return (*self.representation.states, *(s for block in self.blocks for s in block.states))
+
+    def state_rows(self, values: Mapping[str, float]) -> tuple[State, ...]:
+        """See the base class."""
+        return self.representation.state_rows(self, values)
+
+    @property
+    def settling(self) -> Settling:
+        """See the base class."""
+        return self.representation.settling
+
+    def equations(self, smooth: bool) -> Equations:
+        """See the base class."""
+        return equations(self, smooth)
+
+    def module_text(self, smooth: bool) -> str:
+        """See the base class."""
+        return self.representation.module_text(self, smooth)
 
 
 @dataclass(frozen=True)
@@ -102,6 +162,7 @@ class Equations:
         arrival: the states in the frame of the end of the step, from those in the fixed frame and the shift.
         rest: states of a fibre at rest without calcium.
         outputs: values of `OUTPUTS`, at zero shift.
+        shares: names of moments that are divided by the first of them, and so must be right relative to it.
     """
 
     states: tuple[State, ...]
@@ -112,6 +173,7 @@ class Equations:
     arrival: tuple[Expr, ...]
     rest: tuple[Expr, ...]
     outputs: tuple[Expr, ...]
+    shares: tuple[str, ...] = ()
 
 
 def equations(model: Composition, smooth: bool) -> Equations:
@@ -146,6 +208,8 @@ def equations(model: Composition, smooth: bool) -> Equations:
         arrival=tuple(sympy.sympify(e) for e in (*moved, *(symbols[s.name] for s in model.states[3:]))),
         rest=tuple(sympy.sympify(e) for e in rest),
         outputs=tuple(sympy.sympify(e).subs(shift, 0) for e in output_expressions(model, parts.q)),
+        # The smooth form never divides by less than ln 2 / K heads.
+        shares=() if smooth else ("q0", "q1", "q2"),
     )
 
 

@@ -12,7 +12,7 @@ import yaml
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked, complete
-from xb_muscle_ros.models.registry import METHODS, model_of_set
+from xb_muscle_ros.models.registry import BASE_OF, METHODS, compose, model_of_set, split_set
 
 _TOP = ("fibre", "model", "method", "source", "constants", "models")
 
@@ -23,14 +23,15 @@ class Fibre:
 
     Attributes:
         name: of the fibre, for example ``18Dec2017a``.
-        model: name of the parameter set, for example ``3state_coop`` or ``3state_coop_v3``.
+        model: name of the parameter set, for example ``3state_coop`` or ``3state_coop_v3``, or of a variant that uses
+            the set of its base, for example ``3state_coop_rigid``.
         method: representation of the strain distribution, for example ``gaussian``.
         values: every parameter of the set's model, defaults filled in, in the table's units.
         reference_length_m: length at rest, one L0.
         f0_n: isometric force at pCa 4.5, one F0.
         source: where the values come from.
         path: the file, or None where the values came as parameters.
-        available_models: sets that the file holds.
+        available_models: sets that the file holds; their variants are available as well.
     """
 
     name: str
@@ -151,13 +152,10 @@ def fibre_from_parameters(
             f"{where}: there is no parameter set under 'models'; add one, for example 'models: 3state_coop:'"
         )
     chosen = model or text.get("model") or next(iter(sets))
-    if chosen not in sets:
-        model_of_set(chosen, where)
-        raise UserError(f"{where}: model '{chosen}' has no parameter set here; there are {', '.join(sets)}")
     how = method or text.get("method", "gaussian")
     if how not in METHODS:
         raise UserError(f"{where}: method '{how}' is not known{suggest(how, METHODS)}")
-    values = complete(sets[chosen], model_of_set(chosen), f"{where}, model {chosen}", how)
+    values = complete(_own_and_base(chosen, sets, where), model_of_set(chosen), f"{where}, model {chosen}", how)
     for name, number in constants.items():
         if number is None:
             raise UserError(f"{where}: constant '{name}' is missing")
@@ -172,3 +170,22 @@ def fibre_from_parameters(
         path=None,
         available_models=tuple(sets),
     )
+
+
+def _own_and_base(chosen: str, sets: Mapping[str, dict[str, float]], where: str) -> dict[str, float]:
+    """Values of a set; a variant such as ``3state_coop_rigid`` starts from the set of its base, as far as it has use.
+
+    Raises:
+        UserError: neither has a set here.
+    """
+    model, version = split_set(chosen, where)
+    base = BASE_OF[model] + version
+    if chosen in sets and base == chosen:
+        return sets[chosen]
+    if chosen not in sets and base not in sets:
+        nor = "" if base == chosen else f", nor has '{base}'"
+        raise UserError(f"{where}: model '{chosen}' has no parameter set here{nor}; there are {', '.join(sets)}")
+    replaced = set(compose(BASE_OF[model]).parameters) - set(compose(model).parameters)
+    no_use = {row.name for row in replaced}
+    inherited = {name: value for name, value in sets.get(base, {}).items() if name not in no_use}
+    return {**inherited, **sets.get(chosen, {})}

@@ -34,6 +34,7 @@ def grid_module(model: Composition, smooth: bool, remap: str) -> str:
         f"GAMMA, ERROR_SHARE = {ros2.GAMMA!r}, {ros2.ERROR_SHARE!r}\n"
         f"N_OTHERS, N_PARAMETERS, N_RATES = {len(e.states)}, {len(e.parameters)}, {len(e.leaving)}\n"
         f"TEARS = {any(torn for _, torn in e.leaving)!r}\n"
+        f"TORN = {_torn_state(e)!r}\n"
         f"BINS, RANGE, REGRID = {index['bins']}, {index['strain_range']}, {index.get('regrid', -1)}\n"
     )
     parts = [header(model, smooth, ros2.ORDER) + constants, _rate_constants(e), _factors(e), _spreads(e), _leave(e)]
@@ -110,6 +111,21 @@ def _others(e: GridEquations) -> str:
     return _scalar_function(e, "others", doc, e.derivatives, SUMS)
 
 
+def _torn_state(e: GridEquations) -> int:
+    """Index of the state whose heads come back to the bins, -1 for none.
+
+    Raises:
+        ValueError: there is more than one, which the step has no elimination for.
+    """
+    if not e.ways.reattach:
+        return -1
+    names = [s.name for s in e.states]
+    found = [n for n in names if sympy.diff(e.ways.reattach[0].rate, e.symbols[n]) != 0]
+    if len(e.ways.reattach) > 1 or len(found) != 1:
+        raise ValueError(f"heads come back to a grid from one state only, not from {', '.join(found) or 'none'}")
+    return names.index(found[0])
+
+
 def _couplings(e: GridEquations) -> str:
     """How rates of the other states follow the sums of fluxes, and their own states: parts of the Jacobian."""
     results: list[Any] = []
@@ -117,8 +133,11 @@ def _couplings(e: GridEquations) -> str:
         results += [sympy.diff(d, e.symbols[name]) for name in ("kin0", "kin1", "torn_off")]
         # Only decay goes on the implicit matrix: growth (thin-filament cooperativity) is left to the error control.
         own = sympy.diff(d, e.symbols[e.states[i].name]) if i < len(e.states) else 0
-        results.append(own)
-    doc = "Derivatives of each rate by kin0, kin1, torn-off heads and its own state."
+        results += [own, sympy.diff(d, e.symbols["reattached"])]
+    torn = _torn_state(e)
+    comes_back = sympy.diff(e.ways.reattach[0].rate, e.symbols[e.states[torn].name]) if torn >= 0 else 0
+    results.append(comes_back)
+    doc = "Derivatives of each rate by kin0, kin1, torn-off heads, its own state and returning heads; rate of return."
     return _scalar_function(e, "couplings", doc, results, SUMS)
 
 

@@ -14,21 +14,21 @@ _SMALL = 1e-8
 
 
 @njit(cache=True)
-def decay(z: float) -> float:
-    """exp(-|z|), 0 where nothing would come of it: that saves the exponential where activation is well above zero."""
-    size = abs(z)
-    return 0.0 if size > _SATURATED and z > 0.0 else math.exp(-size)
+def decay(z: float, k: float) -> float:
+    """exp(-|k z|), 0 where nothing would come of it: that saves the exponential where activation is well above zero."""
+    kz = k * z
+    return 0.0 if kz > _SATURATED else math.exp(-abs(kz))
 
 
 @njit(cache=True)
-def logistic(z: float, t: float) -> float:
-    """1/(1 + exp(-z)), given t = decay(z)."""
+def logistic(z: float, k: float, t: float) -> float:
+    """1/(1 + exp(-k z)) for a positive k, given t = decay(z, k)."""
     return (1.0 if z > 0.0 else t) / (1.0 + t)
 
 
 @njit(cache=True)
 def softplus(z: float, k: float, t: float) -> float:
-    """ln(1 + exp(k z))/k without overflow, given t = decay(k z)."""
+    """ln(1 + exp(k z))/k without overflow, given t = decay(z, k)."""
     above = z if z > 0.0 else 0.0
     if t < _SMALL:
         return above + t * (1.0 - 0.5 * t) / k
@@ -51,6 +51,31 @@ def positive_part(z: float) -> float:
 def hyperbolic_tangent(z: float) -> float:
     """Tanh by one exponential: absolute error below 2e-16, half the time of the library's tanh."""
     return 1.0 - 2.0 / (math.exp(2.0 * z) + 1.0)
+
+
+@njit(cache=True)
+def tangent_sinh(z: float) -> float:
+    """Sinh up to |z| = 12, its tangent there beyond."""
+    if z > 12.0:
+        return math.sinh(12.0) + math.cosh(12.0) * (z - 12.0)
+    if z < -12.0:
+        return -math.sinh(12.0) + math.cosh(12.0) * (z + 12.0)
+    return math.sinh(z)
+
+
+@njit(cache=True)
+def tangent_cosh(z: float) -> float:
+    """Derivative of `tangent_sinh`; a NaN stays a NaN."""
+    return math.cosh(12.0) if abs(z) > 12.0 else math.cosh(z)
+
+
+@njit(cache=True)
+def deviation(v: float) -> float:
+    """sqrt((v + sqrt(v² + 4e-12))/2), without cancellation for negative v."""
+    root = math.sqrt(v * v + 4e-12)
+    if v < 0.0:
+        return math.sqrt(2e-12 / (root - v))
+    return math.sqrt(0.5 * (v + root))
 
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
@@ -85,11 +110,11 @@ def smooth_series_extension(force: float, c: float, k: float) -> float:
 
 
 C_SOURCE = """
-static inline double decay(double z) {
-    double size = fabs(z);
-    return size > 36.8 && z > 0.0 ? 0.0 : exp(-size);
+static inline double decay(double z, double k) {
+    double kz = k * z;
+    return kz > 36.8 ? 0.0 : exp(-fabs(kz));
 }
-static inline double logistic(double z, double t) { return (z > 0.0 ? 1.0 : t) / (1.0 + t); }
+static inline double logistic(double z, double k, double t) { return (z > 0.0 ? 1.0 : t) / (1.0 + t); }
 static inline double softplus(double z, double k, double t) {
     double above = z > 0.0 ? z : 0.0;
     if (t < 1e-8) return above + t * (1.0 - 0.5 * t) / k;
@@ -97,5 +122,15 @@ static inline double softplus(double z, double k, double t) {
 }
 static inline double unit_step(double z) { return z > 0.0 ? 1.0 : 0.0; }
 static inline double positive_part(double z) { return z < 0.0 ? 0.0 : z; }
+static inline double tangent_sinh(double z) {
+    if (z > 12.0) return sinh(12.0) + cosh(12.0) * (z - 12.0);
+    if (z < -12.0) return -sinh(12.0) + cosh(12.0) * (z + 12.0);
+    return sinh(z);
+}
+static inline double tangent_cosh(double z) { return cosh(fmin(fabs(z), 12.0)); }
+static inline double deviation(double v) {
+    double root = sqrt(v * v + 4e-12);
+    return v < 0.0 ? sqrt(2e-12 / (root - v)) : sqrt(0.5 * (v + root));
+}
 static inline double hyperbolic_tangent(double z) { return 1.0 - 2.0 / (exp(2.0 * z) + 1.0); }
 """

@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 # The fixed stepper's guard: an embedded error of 1e-4 is 0.02 % of F0; smooth input at 1 ms stays 100 times below it.
 GUARD = 1e-4
 # Rows of scratch: four for the loops, the others for a model's step.
-SCRATCH_ROWS = 13
+SCRATCH_ROWS = 14
 _SETTLE_TOLERANCE = 1e-8
 _LONGEST_SETTLING_S = 1e6
 
@@ -79,8 +79,8 @@ class Muscle:
         self.code: Any = compiled(model, fibre.method, fibre.values["smoothing"] > 0.0)
         self.parameters: Array = self.code.prepare(np.array([fibre.values[row.name] for row in composition.parameters]))
         self.parameters.setflags(write=False)
-        self._settling = composition.representation.settling
-        self._states = composition.representation.state_rows(composition, fibre.values)
+        self._settling = composition.settling
+        self._states = composition.state_rows(fibre.values)
         self._n = len(self._states) + 3
         self._out = np.zeros(len(Outputs._fields))
         if self.code not in _WARM:
@@ -129,7 +129,7 @@ class Muscle:
             state = self.hold(state, calcium_um, chunk)
             total += chunk
             self.code.slope(state, 0.0, calcium_um, self.parameters, rates)
-            if np.max(np.abs(rates)) < self._settling.rate:
+            if np.max(np.abs(rates), initial=0.0) < self._settling.rate:
                 return state
             chunk = min(2.0 * chunk, longest)
         raise UserError(

@@ -8,19 +8,24 @@ import sympy
 
 
 class Decay(sympy.Function):
-    """exp(-|z|): what softplus and its derivative share."""
+    """exp(-|k z|), arguments z and k: what softplus and its derivative share.
 
-    nargs = 1
-
-
-class Logistic(sympy.Function):
-    """1/(1 + exp(-z)); arguments z and exp(-|z|), which was computed before."""
+    Two arguments rather than their product, which SymPy would flatten into z's own factors: the same exponential would
+    then go under two names.
+    """
 
     nargs = 2
 
+
+class Logistic(sympy.Function):
+    """1/(1 + exp(-k z)); arguments z, k and exp(-|k z|), which was computed before."""
+
+    nargs = 3
+
     def fdiff(self, argindex: int = 1) -> Any:
-        """d/dz; the second argument follows the first."""
-        return self * (1 - self) if argindex == 1 else sympy.Integer(0)
+        """d/dz or d/dk; the third argument follows the others."""
+        z, k, _ = self.args
+        return (k, z, sympy.Integer(0))[argindex - 1] * self * (1 - self)
 
 
 class Softplus(sympy.Function):
@@ -32,9 +37,9 @@ class Softplus(sympy.Function):
         """d/dz or d/dk; the third argument follows the others."""
         z, k, decay = self.args
         if argindex == 1:
-            return Logistic(k * z, decay)
+            return Logistic(z, k, decay)
         if argindex == 2:
-            return (z * Logistic(k * z, decay) - self) / k
+            return (z * Logistic(z, k, decay) - self) / k
         return sympy.Integer(0)
 
 
@@ -58,6 +63,32 @@ class Positive(sympy.Function):
         return UnitStep(self.args[0])
 
 
+class TangentCosh(sympy.Function):
+    """cosh(z) up to |z| = 12, constant beyond: the derivative of `TangentSinh`. Never differentiated itself."""
+
+    nargs = 1
+
+
+class TangentSinh(sympy.Function):
+    """sinh(z) up to |z| = 12, its tangent there beyond."""
+
+    nargs = 1
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        """d/dz."""
+        return TangentCosh(self.args[0])
+
+
+class Deviation(sympy.Function):
+    """sqrt((v + sqrt(v² + 4e-12))/2): see `ops.deviation`."""
+
+    nargs = 1
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        """d/dv."""
+        return self / (2 * sympy.sqrt(self.args[0] ** 2 + 4e-12))
+
+
 # Printed as calls of these names, in Python and in C alike.
 CALLS = {
     "Decay": "decay",
@@ -66,6 +97,9 @@ CALLS = {
     "UnitStep": "unit_step",
     "Positive": "positive_part",
     "tanh": "hyperbolic_tangent",
+    "TangentSinh": "tangent_sinh",
+    "TangentCosh": "tangent_cosh",
+    "Deviation": "deviation",
 }
 
 

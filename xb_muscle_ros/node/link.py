@@ -21,6 +21,7 @@ from xb_muscle_ros.node.executor import make_executor
 from xb_muscle_ros.node.status import Account
 
 _ANSWER_S = 10.0
+_SEND_AGAIN_S = 3.0
 
 
 class Link:
@@ -43,7 +44,7 @@ class Link:
             # In a context of its own, and deaf to the arguments of the program that uses it.
             self._context.init(args=[], domain_id=domain_id)
             self.node: Any = rclpy.create_node(
-                name, context=self._context, namespace=namespace, use_global_arguments=False
+                name, context=self._context, namespace=namespace, use_global_arguments=False, enable_rosout=False
             )
         except Exception as error:
             raise UserError(f"ROS 2 cannot be started: {error}; check ROS_DOMAIN_ID and the network") from error
@@ -102,15 +103,23 @@ class Link:
     def call(self, kind: Any, service: str, request: Any, timeout_s: float = _ANSWER_S) -> Any:
         """Response of a service of the muscle node, for example ``reset``.
 
+        A request may get lost while the node does not know of this client yet, so it is sent again from time to time:
+        the first response counts.
+
         Raises:
             UserError: no response.
         """
         client = self.node.create_client(kind, f"{self.peer}/{service}")
         try:
-            if self.wait_for(client.service_is_ready, timeout_s):
-                future = client.call_async(request)
-                if self.wait_for(future.done, timeout_s):
-                    return future.result()
+            end = time.monotonic() + timeout_s
+            futures: list[Any] = []
+            while (rest := end - time.monotonic()) > 0.0:
+                if self.wait_for(client.service_is_ready, rest):
+                    futures.append(client.call_async(request))
+                    self.wait_for(lambda: any(future.done() for future in futures), min(rest, _SEND_AGAIN_S))
+                done = [future.result() for future in futures if future.done()]
+                if done:
+                    return done[0]
         finally:
             self.node.destroy_client(client)
         raise UserError(f"node {self.peer} does not answer to {service}; is it still running?")

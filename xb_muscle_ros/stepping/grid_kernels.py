@@ -24,6 +24,7 @@ RANGE = 0
 REGRID = 0
 GAMMA = 0.0
 TEARS = False
+TORN = -1
 ERROR_SHARE = 0.0
 
 # Scalar functions of the model, each returning a tuple; see `models.grid_codegen`.
@@ -84,6 +85,16 @@ def attach(rates: Any, shift: float, p: Array, density: Array) -> float:
             x = (i * dx - p[RANGE] + shift) / width
             density[i] += scale * math.exp(-0.5 * x * x)
     return back
+
+
+def unit_gaussian(width: float, shift: float, p: Array, density: Array) -> None:
+    """One head, spread over the bins around strain 0."""
+    bins = int(p[BINS])
+    dx = 2.0 * p[RANGE] / (bins - 1)
+    scale = 1.0 / (width * math.sqrt(2.0 * math.pi))
+    for i in range(bins):
+        x = (i * dx - p[RANGE] + shift) / width
+        density[i] = scale * math.exp(-0.5 * x * x)
 
 
 def sums_over_bins(n: Array, bins: int) -> Any:
@@ -175,7 +186,8 @@ def attempt(s: Array, h: float, velocity: float, calcium: float, p: Array, out: 
 
     The matrix in place of the Jacobian has the bins' detachment rates and the other states' own decay on its diagonal,
     and below it how the other states and the velocity follow the bins: without that, the flux of heads that are about
-    to detach would move the contractile element as if they stayed.
+    to detach would move the contractile element as if they stayed. Torn-off heads come back within a fraction of a
+    millisecond: their state and the bins are solved together.
     """
     bins = int(p[BINS])
     dx = 2.0 * p[RANGE] / (bins - 1)
@@ -188,6 +200,7 @@ def attempt(s: Array, h: float, velocity: float, calcium: float, p: Array, out: 
     scratch = work[10]
     inverse = work[11]
     lost = work[12]
+    coming = work[13]
     shift = s[bins + N_OTHERS]
     lowest = shift - p[RANGE]
     length = s[bins + N_OTHERS + 1]
@@ -200,6 +213,17 @@ def attempt(s: Array, h: float, velocity: float, calcium: float, p: Array, out: 
         inverse[i] = 1.0 / (1.0 + gh * going[i])
     for i in range(bins):
         k1[i] *= inverse[i]
+    comes_back = part[5 * (N_OTHERS + 1)]
+    pivot = 1.0
+    returned = 0.0
+    if TORN >= 0:
+        unit_gaussian(spreads(*sums[:3], y, length, velocity, calcium, p)[3], shift, p, coming)
+        for i in range(bins):
+            coming[i] *= gh * comes_back * inverse[i]
+        pivot += gh * (comes_back - torn_sum(tearing, coming, bins) * dx)
+        returned = (rates[TORN] + gh * torn_sum(tearing, k1, bins) * dx) / pivot
+        for i in range(bins):
+            k1[i] += returned * coming[i]
     for i in range(bins):
         out[i] = s[i] + h * k1[i]
     for i in range(bins):
@@ -207,9 +231,10 @@ def attempt(s: Array, h: float, velocity: float, calcium: float, p: Array, out: 
     leave0, leave1, _ = moments(lost, bins, dx, lowest)
     leave_torn = torn_sum(tearing, k1, bins) * dx
     for j in range(N_OTHERS + 1):
-        follow_bins = part[4 * j + 2] * leave_torn - part[4 * j] * leave0 - part[4 * j + 1] * leave1
-        own = min(part[4 * j + 3], 0.0)
-        k1[bins + j] = (rates[j] + gh * follow_bins) / (1.0 - gh * own)
+        follow_bins = part[5 * j + 2] * leave_torn - part[5 * j] * leave0 - part[5 * j + 1] * leave1
+        follow_bins += (part[5 * j] + part[5 * j + 4]) * comes_back * returned
+        own = min(part[5 * j + 3], 0.0)
+        k1[bins + j] = returned if j == TORN else (rates[j] + gh * follow_bins) / (1.0 - gh * own)
         out[bins + j] = s[bins + j] + h * k1[bins + j]
     y2 = out[bins : bins + N_OTHERS]
     shift2 = out[bins + N_OTHERS]
@@ -218,6 +243,10 @@ def attempt(s: Array, h: float, velocity: float, calcium: float, p: Array, out: 
     rates2 = others(*sums2, y2, length2, velocity, calcium, p)
     for i in range(bins):
         k2[i] = (k2[i] - 2.0 * k1[i]) * inverse[i]
+    if TORN >= 0:
+        returned = (rates2[TORN] - 2.0 * k1[bins + TORN] + gh * torn_sum(tearing, k2, bins) * dx) / pivot
+        for i in range(bins):
+            k2[i] += returned * coming[i]
     for i in range(bins):
         lost[i] = going[i] * k2[i]
     for i in range(bins):
@@ -229,9 +258,10 @@ def attempt(s: Array, h: float, velocity: float, calcium: float, p: Array, out: 
     e0, e1, _ = moments(other, bins, dx, lowest)
     error = max(abs(e0), abs(e1))
     for j in range(N_OTHERS + 1):
-        follow_bins = part[4 * j + 2] * leave_torn - part[4 * j] * leave0 - part[4 * j + 1] * leave1
-        own = min(part[4 * j + 3], 0.0)
-        k2[bins + j] = (rates2[j] - 2.0 * k1[bins + j] + gh * follow_bins) / (1.0 - gh * own)
+        follow_bins = part[5 * j + 2] * leave_torn - part[5 * j] * leave0 - part[5 * j + 1] * leave1
+        follow_bins += (part[5 * j] + part[5 * j + 4]) * comes_back * returned
+        own = min(part[5 * j + 3], 0.0)
+        k2[bins + j] = returned if j == TORN else (rates2[j] - 2.0 * k1[bins + j] + gh * follow_bins) / (1.0 - gh * own)
         error = max(error, abs(k1[bins + j] + k2[bins + j]))
         out[bins + j] = s[bins + j] + h * (1.5 * k1[bins + j] + 0.5 * k2[bins + j])
     error *= 0.5 * h * ERROR_SHARE

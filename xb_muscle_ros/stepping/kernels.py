@@ -54,7 +54,7 @@ def advance(
         h: first step to try, s.
         tol: largest embedded error of a step, in units of the states.
         out: receives the new state vector; on failure the offending one.
-        work: scratch, shape (13, n).
+        work: scratch, shape (14, n).
 
     Returns:
         (code, index of the state at fault or -1, time reached in s, next step to try in s, steps taken, steps tried)
@@ -126,7 +126,7 @@ def run(
         substeps: steps of the fixed stepper between two samples.
         every: stride of the samples to keep.
         out: receives states, shape ((samples - 1) // every + 1, n); on failure its last row is the offending one.
-        work: scratch, shape (13, n).
+        work: scratch, shape (14, n).
 
     Returns:
         (code, index of the state at fault, index of the sample reached, time within the step in s, steps tried)
@@ -175,7 +175,7 @@ def follow(
         sample: ascending times within the corners, s, shape (samples,).
         first_h: step to try first, s; it is carried over the corners, where the error control finds the new one.
         out: receives states at the samples, shape (samples, n).
-        work: scratch, shape (13, n).
+        work: scratch, shape (14, n).
 
     Returns:
         (code, index of the state at fault, time reached in s, steps tried, steps taken)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from xb_muscle_ros.mechanisms import ops
 from xb_muscle_ros.mechanisms.base import Attachment, GaussianSpread, Parameter, Quantities
 
 F_RATE = Parameter("f", "1/s", "attachment rate, summed over strain", 0.0, 1e6, None, "van der Zee et al. 2026")
@@ -17,11 +18,15 @@ WIDTH = Parameter(
 
 
 class GaussianAttachment(Attachment):
-    """D f/(w sqrt(2 pi)) exp(-x²/(2 w²)) (N - Q0)."""
+    """D f/(w sqrt(2 pi)) exp(-x²/(2 w²)) (N - Q0), and none where no site is free.
+
+    With a cooperative thin filament N never falls below Q0. A sigmoid one follows falling calcium past the heads still
+    bound; without the limit heads would then be taken away around strain 0, where there may be none.
+    """
 
     name = "gaussian"
     parameters = (F_RATE, WIDTH)
 
     def spread(self, q: Quantities) -> GaussianSpread:
         """See the class."""
-        return GaussianSpread(q.ready_heads * q.f * (q.available_sites - q.q0), q.w)
+        return GaussianSpread(q.ready_heads * q.f * ops.positive(q.available_sites - q.q0), q.w)

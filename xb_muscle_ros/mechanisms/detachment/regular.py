@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from xb_muscle_ros.mechanisms.base import Detachment, ExponentialRate, Parameter, Quantities, StrainRate
 
 _SOURCE = "van der Zee et al. 2026"
@@ -19,7 +21,7 @@ class RegularDetachment(Detachment):
     """g(x) = k11 exp(-k12 x) + k21 exp(k22 x)."""
 
     name = "regular"
-    parameters = (K11, K12, K21, K22)
+    parameters: ClassVar[tuple[Parameter, ...]] = (K11, K12, K21, K22)
 
     def rates(self, q: Quantities) -> tuple[StrainRate, ...]:
         """See the class."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities, Series
+from xb_muscle_ros.mechanisms.base import Balance, Contractile, Parameter, Quantities, Series, State
 from xb_muscle_ros.mechanisms.ops import Expr
 
 KSE = Parameter("kse", "1/power stroke", "exponent of the series spring", 1e-4, 100.0, None, "van der Zee et al. 2026")
@@ -12,6 +12,7 @@ KSE0 = Parameter(
 )
 
 
+EXTENSION = State("l_se", "power strokes", "length of the series element beyond slack", -1e5, 1e5)
 SMOOTH_STIFFNESS = Parameter(
     "smooth_stiffness",
     "1",
@@ -33,6 +34,7 @@ class ExponentialSeries(Series):
 
     name = "exponential"
     parameters = (KSE, KSE0, SMOOTH_STIFFNESS)
+    length_states = (EXTENSION,)
 
     def ce_velocity(self, q: Quantities) -> Expr:
         """U = (gamma v k_se - dF_kin)/(dF/dx + k_se)."""
@@ -48,3 +50,9 @@ class ExponentialSeries(Series):
             return ops.smooth_series_extension(q.force_xb, q.kse0, q.smoothing) / q.kse
         taut = ops.positive(q.force_xb)
         return ops.log(1 + taut / q.kse0) / q.kse + (q.force_xb - taut) / (q.kse * q.kse0)
+
+    def balance(self, q: Quantities, element: Contractile) -> Balance:
+        """The spring's length is a state and its force what the contractile element bears; slack bears none."""
+        force = q.kse0 * (ops.exp(q.kse * ops.positive(q.l_se)) - 1)
+        velocity = element.velocity_at(force)
+        return Balance(force, velocity, q.l_se, {"l_se": q.gamma * q.velocity - velocity})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from xb_muscle_ros.mechanisms.base import Quantities, Series
+from xb_muscle_ros.mechanisms.base import Balance, Contractile, Quantities, Series
 from xb_muscle_ros.mechanisms.ops import Expr
 
 
@@ -18,3 +18,8 @@ class RigidSeries(Series):
     def extension(self, q: Quantities) -> Expr:
         """None at any force."""
         return 0.0
+
+    def balance(self, q: Quantities, element: Contractile) -> Balance:
+        """The contractile element moves as the fibre does, and its force follows."""
+        velocity = q.gamma * q.velocity
+        return Balance(element.force_at(velocity), velocity, 0.0, {})

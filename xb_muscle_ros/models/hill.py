@@ -1,0 +1,87 @@
+"""Hill-type models: an activation and a force-velocity relation in place of cross-bridges."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from xb_muscle_ros.mechanisms.base import Contractile, Mechanism, Parallel, Parameter, Quantities, Series, State
+from xb_muscle_ros.mechanisms.lumped import Activation, ForceVelocity
+from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.models.composition import COMMON, INPUTS, OUTPUTS, Equations, Model, distinct
+
+
+@dataclass(frozen=True)
+class Hill(Model):
+    """One block of each family. Nothing is distributed over strain: every method means the same.
+
+    The integrated state is the series element's length, if there is one, and the contractile element's follows from the
+    fibre's: force and both lengths fit each other by construction. In `Outputs` the activation stands as ``n_on``; the
+    moments, ready and torn-off heads are 0.
+    """
+
+    name: str
+    activation: Activation
+    force_velocity: ForceVelocity
+    series: Series
+    parallel: Parallel
+
+    @property
+    def blocks(self) -> tuple[Mechanism, ...]:
+        """All blocks, in the order in which their states stand."""
+        return (self.activation, self.force_velocity, self.series, self.parallel)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Rows of the parameter table that this model needs, without repeats."""
+        return distinct((*(p for block in self.blocks for p in block.parameters), *COMMON))
+
+    @property
+    def states(self) -> tuple[State, ...]:
+        """States that are integrated, without the inputs."""
+        return (*self.activation.states, *self.series.length_states)
+
+    def equations(self, smooth: bool) -> Equations:
+        """Write the model out; there is nothing to smooth."""
+        import sympy
+
+        names = [*(s.name for s in self.states), *(i.name for i in INPUTS), *(p.name for p in self.parameters)]
+        symbols = {name: sympy.Symbol(name, real=True) for name in names}
+        q = Quantities(symbols, self.name, None)
+        level = self.activation.level(q.for_block(self.activation.name))
+        of_relation = q.for_block(self.force_velocity.name)
+        element = Contractile(
+            force_at=lambda velocity: level * self.force_velocity.force(of_relation, velocity),
+            velocity_at=lambda force: self.force_velocity.velocity(of_relation, force / level),
+        )
+        balance = self.series.balance(q.for_block(self.series.name), element)
+        others = {**self.activation.derivatives(q.for_block(self.activation.name)), **balance.derivatives}
+        force_ce = q.Fscale * balance.force
+        force_pe = self.parallel.force(q.for_block(self.parallel.name))
+        shown: Mapping[str, Expr] = {
+            "force_f0": force_ce + force_pe,
+            "force_ce_f0": force_ce,
+            "force_pe_f0": force_pe,
+            "ce_length_change_l0": q.length_change - balance.extension / q.gamma,
+            "ce_velocity_l0_per_s": balance.ce_velocity / q.gamma,
+            "n_on": level,
+        }
+        rest = {**self.activation.rest(q.for_block(self.activation.name))}
+        return Equations(
+            states=self.states,
+            parameters=self.parameters,
+            symbols=symbols,
+            shift=sympy.Symbol("shift", real=True),
+            derivatives=tuple(
+                sympy.sympify(e) for e in (*(others[s.name] for s in self.states), balance.ce_velocity, q.velocity)
+            ),
+            arrival=tuple(symbols[s.name] for s in self.states),
+            rest=tuple(sympy.sympify(rest.get(s.name, 0)) for s in self.states),
+            outputs=tuple(sympy.sympify(shown.get(name, 0)) for name in OUTPUTS),
+        )
+
+    def module_text(self, smooth: bool) -> str:
+        """Every state is a symbol, whatever the method."""
+        from xb_muscle_ros.models.codegen import flat_module
+
+        return flat_module(self, smooth)
