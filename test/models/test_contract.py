@@ -33,8 +33,8 @@ def fibre_for(model: str, method: str, smoothing: float) -> Fibre:
         values = complete({k: v for k, v in full.values.items() if k in names}, model, "test", method)
     values["smoothing"] = smoothing
     if "steepness" in values:
-        # The moments take a sharp step; with a steep one the distribution does the same.
-        values["steepness"] = 100.0
+        # The moments take a sharp step; with the steepest one the distribution does nearly the same.
+        values["steepness"] = 20.0
     return Fibre(**{**full.__dict__, "model": model, "method": method, "values": MappingProxyType(values)})
 
 

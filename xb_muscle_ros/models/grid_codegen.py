@@ -154,9 +154,9 @@ def _bounds(e: GridEquations) -> str:
 
 
 def _kernels(remap: str) -> str:
-    """The loops over bins of `stepping.grid_kernels`, with one of the remappings under the name `regrid`."""
+    """The loops over bins, with one of the remappings under the name `regrid`."""
     from xb_muscle_ros.models.codegen import compiled_text
-    from xb_muscle_ros.stepping import grid_kernels
+    from xb_muscle_ros.stepping import grid_kernels, grid_remap
 
-    text = compiled_text(Path(grid_kernels.__file__))
+    text = compiled_text(Path(grid_kernels.__file__)) + "\n\n\n" + compiled_text(Path(grid_remap.__file__))
     return text + f"\n\nregrid = {remap}\n"

@@ -122,34 +122,27 @@ def jacobian(of: Program, variables: Sequence[Any], prefix: str) -> tuple[Progra
     return Program(lines, of.results), rows
 
 
-class _Python(PythonCodePrinter):
+class _OwnCalls:
+    """Functions of `intrinsics` by name, and small whole powers as products, whatever the language."""
+
+    def _print_Function(self, expr: Any) -> str:
+        name = type(expr).__name__
+        if name in CALLS:
+            return f"{CALLS[name]}({', '.join(self._print(a) for a in expr.args)})"  # type: ignore[attr-defined]
+        return str(super()._print_Function(expr))  # type: ignore[misc]
+
+    _print_tanh = _print_Function
+
+    def _print_Pow(self, expr: Any, **how: Any) -> str:
+        return _power(self, expr) or str(super()._print_Pow(expr, **how))  # type: ignore[misc]
+
+
+class _Python(_OwnCalls, PythonCodePrinter):
     """Numba code: scalar functions from `math` and `intrinsics`."""
 
-    def _print_Function(self, expr: Any) -> str:
-        name = type(expr).__name__
-        if name in CALLS:
-            return f"{CALLS[name]}({', '.join(self._print(a) for a in expr.args)})"
-        return str(super()._print_Function(expr))
 
-    _print_tanh = _print_Function
-
-    def _print_Pow(self, expr: Any, rational: bool = False) -> str:
-        return _power(self, expr) or str(super()._print_Pow(expr, rational=rational))
-
-
-class _C(C99CodePrinter):
+class _C(_OwnCalls, C99CodePrinter):
     """C code with the same operations in the same order."""
-
-    def _print_Function(self, expr: Any) -> str:
-        name = type(expr).__name__
-        if name in CALLS:
-            return f"{CALLS[name]}({', '.join(self._print(a) for a in expr.args)})"
-        return str(super()._print_Function(expr))
-
-    _print_tanh = _print_Function
-
-    def _print_Pow(self, expr: Any) -> str:
-        return _power(self, expr) or str(super()._print_Pow(expr))
 
 
 def _power(printer: Any, expr: Any) -> str | None:

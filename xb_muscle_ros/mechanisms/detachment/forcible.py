@@ -19,12 +19,12 @@ B_REATTACH = Parameter(
     _SOURCE,
 )  # fmt: skip
 CRITICAL = Parameter(
-    "dLcrit", "power strokes", "critical strain x_c past which heads are torn off", -10.0, 100.0, None, _SOURCE
+    "dLcrit", "power strokes", "critical strain x_c past which heads are torn off", -10.0, 15.0, None, _SOURCE
 )
 STEEPNESS = Parameter(
     "steepness", "1/power stroke",
     "slope of the tanh by which forcible detachment sets in (paper 20, released sets 3); moments take a sharp step",
-    1e-3, 1e4, 20.0, _SOURCE,
+    1e-3, 20.0, 20.0, _SOURCE,
 )  # fmt: skip
 
 
