@@ -24,7 +24,7 @@ _PCAS = (4.5, 6.1, 6.3, 6.6, 9.0)
 
 
 def demo(recordings: Path | None, out: Path, live: bool) -> int:
-    """Run the demo from the top of the source tree; returns the exit code.
+    """Run the demo from the top of the source tree; returns the exit code, 1 where node and replay differ.
 
     Args:
         recordings: folder with the recordings of the rat soleus; looked for beside the source tree where None.
@@ -45,7 +45,7 @@ def demo(recordings: Path | None, out: Path, live: bool) -> int:
     fibre = load_fibre(FIBRE)
     offline = replay(trials, fibre)
     print(f"\n{offline.table}")
-    through_node = None
+    through_node, agrees = None, True
     if live and importlib.util.find_spec("rclpy") is None:
         print("\nROS 2 is not installed here (rclpy): the part through muscle_node is left out")
     elif live:
@@ -57,15 +57,15 @@ def demo(recordings: Path | None, out: Path, live: bool) -> int:
             through_node = replay(trials, fibre, functools.partial(play_live, domain_id=domain, find_s=30.0))
         print(f"\n{through_node.table}")
         write_results(out / "live", trials, through_node)
-        same = all(
+        agrees = all(
             bool((a.force_n == b.force_n).all()) and a.force_n.size == b.force_n.size
             for a, b in zip(offline.simulated, through_node.simulated, strict=True)
         )
-        print(f"\nforce through the node equals offline replay {'bit for bit' if same else 'NOT BIT FOR BIT'}")
+        print(f"\nforce through the node equals offline replay {'bit for bit' if agrees else 'NOT BIT FOR BIT'}")
     print("\nresults:")
     for path in write_results(out, trials, offline, through_node):
         print(f"  {path.resolve()}")
-    return 0
+    return 0 if agrees else 1
 
 
 def _import(files: list[Path], folder: Path) -> list[Path]:
