@@ -196,7 +196,7 @@ class Muscle:
         states = np.zeros(((length_change_l0.size - 1) // every + 1, self._n))
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (dt_s, length_change_l0, calcium_um)]
         code, fault, k, within, steps = self.code.run(
-            state, *arrays, self.parameters, 0.0, GUARD, substeps, every, states, self._work
+            state, *arrays, self.parameters, GUARD, substeps, every, states, self._work
         )
         if code != 0:
             self.complain(code, fault, float(arrays[0][: k - 1].sum() + within), states[-1])

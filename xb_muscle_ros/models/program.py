@@ -123,7 +123,10 @@ def jacobian(of: Program, variables: Sequence[Any], prefix: str) -> tuple[Progra
 
 
 class _OwnCalls:
-    """Functions of `intrinsics` by name, and small whole powers as products, whatever the language."""
+    """Functions of `intrinsics` by name, and small whole powers as products, whatever the language.
+
+    Mixed into SymPy's printers, which have what is missing here; SymPy has no types to say so.
+    """
 
     def _print_Function(self, expr: Any) -> str:
         name = type(expr).__name__

@@ -113,7 +113,7 @@ def advance(
 
 
 def run(
-    s: Array, dt_s: Array, length: Array, calcium: Array, p: Array, max_h: float, tol: float, substeps: int,
+    s: Array, dt_s: Array, length: Array, calcium: Array, p: Array, tol: float, substeps: int,
     every: int, out: Array, work: Array,
 ) -> Any:  # fmt: skip
     """Follow samples of length and calcium; `out[k]` is the state at sample k * every, `out[0]` is `s`.
@@ -122,8 +122,7 @@ def run(
         s: state at the first sample.
         dt_s: shape (samples - 1,), time from each sample to the next, s.
         length, calcium: shape (samples,), L0, µM; calcium[k] acts in the step that ends at sample k.
-        max_h: 0 for the fixed stepper, else the variable one with this longest step, s.
-        substeps: steps of the fixed stepper between two samples.
+        substeps: fixed steps between two samples.
         every: stride of the samples to keep.
         out: receives states, shape ((samples - 1) // every + 1, n); on failure its last row is the offending one.
         work: scratch, shape (14, n).
@@ -139,16 +138,13 @@ def run(
         here[i] = s[i]
         out[0, i] = s[i]
     steps = 0
-    h = max_h
     for k in range(1, samples):
         dt = dt_s[k - 1] / substeps
         start = length[k - 1]
         rise = length[k] - start
         for j in range(substeps):
             end = length[k] if j == substeps - 1 else start + rise * ((j + 1) / substeps)
-            code, fault, t, h, _, tried = advance(
-                here, end, calcium[k], dt, p, dt if max_h <= 0.0 else min(h, max_h), tol, there, work
-            )
+            code, fault, t, _, _, tried = advance(here, end, calcium[k], dt, p, dt, tol, there, work)
             steps += tried
             for i in range(n):
                 here[i] = there[i]

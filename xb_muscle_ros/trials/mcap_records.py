@@ -15,7 +15,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
 
-import lz4.frame  # type: ignore[import-untyped]
+import lz4.frame  # type: ignore[import-untyped]  # it ships no types
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
