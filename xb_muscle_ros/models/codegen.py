@@ -12,7 +12,7 @@ from xb_muscle_ros.mechanisms.base import Parameter
 from xb_muscle_ros.models.composition import INPUTS, OUTPUTS, Equations, Model
 from xb_muscle_ros.models.elimination import Elimination
 from xb_muscle_ros.models.program import Program, c, jacobian, program, python
-from xb_muscle_ros.stepping import rodas3
+from xb_muscle_ros.stepping import ros3
 
 _HEADER = '''"""Generated from the mechanisms of model {name}{smooth}; do not edit."""
 
@@ -36,7 +36,8 @@ from xb_muscle_ros.models.intrinsics import (
 '''
 # How wrong a moment may be relative to the heads attached, as a multiple of the tolerance: 1/0.01.
 _SHARE_OF_HEADS = 0.01
-_JIT = '@njit(cache=True, error_model="numpy")'
+# Inlined, because a call hands over each array in seven pieces: that took a quarter of a step.
+_JIT = '@njit(cache=True, error_model="numpy", forceinline=True)'
 
 
 def module_text(model: Model, smooth: bool) -> str:
@@ -52,8 +53,15 @@ def module_text(model: Model, smooth: bool) -> str:
 def header(model: Model, smooth: bool, order: int) -> str:
     """Head of a generated module: imports, and the constants that the loops of `stepping.kernels` use."""
     head = _HEADER.format(name=model.name, smooth=" with smooth functions" if smooth else "")
-    codes = "OK, NOT_FINITE, OUT_OF_BOUNDS, TOO_MANY_STEPS = 0, 1, 2, 3\nMAX_ATTEMPTS = 20000\n"
-    return f"{head}\n\n{codes}EXPONENT = {1.0 / order!r}\nORDER = {order}\nOUTPUTS = {OUTPUTS!r}\n"
+    constants = [
+        "OK, NOT_FINITE, OUT_OF_BOUNDS, TOO_MANY_STEPS = 0, 1, 2, 3",
+        "MAX_ATTEMPTS = 20000",
+        f"EXPONENT = {1.0 / order!r}",
+        f"SMALL_ERROR = {(0.9 / 5.0) ** order!r}",
+        f"ORDER = {order}",
+        f"OUTPUTS = {OUTPUTS!r}",
+    ]
+    return "\n".join([head, "", *constants, ""])
 
 
 def flat_module(model: Model, smooth: bool) -> str:
@@ -61,7 +69,7 @@ def flat_module(model: Model, smooth: bool) -> str:
     e = model.equations(smooth)
     prepare = function("prepare(p)", "Parameters and what is computed from them once.", ["return p.copy()"])
     stay = function("regrid(s, p, work)", "Moments need no grid.", ["pass"])
-    parts = [header(model, smooth, rodas3.ORDER), prepare, stay, _rhs(e), _attempt(e), _slope(e)]
+    parts = [header(model, smooth, ros3.ORDER), prepare, stay, _rhs(e), _attempt(e), _slope(e)]
     parts += [vector("rest", e.parameters, e.rest), _outputs(e), _violation(e, smooth)]
     return "\n\n".join(parts) + "\n\n\n" + kernels() + "\n"
 
@@ -142,31 +150,27 @@ def _attempt(e: Equations) -> str:
     solver = Elimination([[entries[i * n + j] != 0 for j in range(n)] for i in range(n)])
     lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
     lines += [*parameter_loads(e.parameters, used_symbols(flat)), *assignments(flat)]
-    lines += ["per_h = 1.0 / h", f"diagonal = per_h * {1.0 / rodas3.GAMMA!r}"]
+    lines += ["per_h = 1.0 / h", f"diagonal = per_h * {1.0 / ros3.GAMMA!r}"]
     for i, j in solver.entries():
         entry = entries[i * n + j]
         value = "" if entry == 0 else f" - ({python(entry)})"
         lines.append(f"a_{i}_{j} = {'diagonal' if i == j else '0.0'}{value}")
     lines += solver.factor("a")
-    for stage in range(4):
+    lines += [f"f0_{i} = {python(r)}" for i, r in enumerate(first)]
+    values, last_point = [f"f0_{i}" for i in range(n)], list[str]()
+    for stage in range(len(ros3.A)):
         k = f"k{stage}"
-        point = [_sum([names[i] if i < n - 1 else "0.0"], rodas3.A[stage], i) for i in range(n)]
-        if stage == 0:
-            values = [python(r) for r in first]
-        elif all(x == 0.0 for x in rodas3.A[stage]):
-            values = [f"f0_{i}" for i in range(n)]
-        else:
+        point = [_sum([names[i] if i < n - 1 else "0.0"], ros3.A[stage], i) for i in range(n)]
+        if stage > 0 and point != last_point:
             lines.append(f"f{stage} = rates({', '.join(point)}, velocity, calcium, p)")
             values = [f"f{stage}[{i}]" for i in range(n)]
-        if stage == 0:
-            lines += [f"f0_{i} = {v}" for i, v in enumerate(values)]
-            values = [f"f0_{i}" for i in range(n)]
+        last_point = point
         for i in range(n):
-            memory = _sum([], rodas3.C[stage], i)
+            memory = _sum([], ros3.C[stage], i)
             lines.append(f"{k}_{i} = {values[i]}" + (f" + per_h * ({memory})" if memory else ""))
         lines += solver.solve("a", k)
-    lines += [f"e_{i} = {_sum([], rodas3.E, i)}" for i in range(n)]
-    lines += [f"y_{i} = {_sum([names[i] if i < n - 1 else '0.0'], rodas3.M, i)}" for i in range(n)]
+    lines += [f"e_{i} = {_sum([], ros3.E, i)}" for i in range(n)]
+    lines += [f"y_{i} = {_sum([names[i] if i < n - 1 else '0.0'], ros3.M, i)}" for i in range(n)]
     swap = {symbol: sympy.Symbol(f"y_{i}", real=True) for i, symbol in enumerate(variables)}
     arrival = program([x.subs(swap, simultaneous=True) for x in e.arrival], "m")
     lines += assignments(arrival)
