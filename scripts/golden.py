@@ -1,13 +1,15 @@
-"""Compare the models with the authors' output, all cells: golden.py GOLDEN_SRS_JSON [TABLE ...]."""
+"""Compare the models with the authors' output, all cells of `golden_srs.json`."""
 
 from __future__ import annotations
 
+import argparse
+import csv
 import sys
 from pathlib import Path
 
 import numpy as np
 
-from xb_muscle_ros.bench.golden import QUANTITIES, SETS, STEPPERS, compare
+from xb_muscle_ros.bench.golden import QUANTITIES, SETS, STEPPERS, Cell, compare
 
 # Table -> largest median and largest single error that are accepted.
 BARS = {
@@ -28,11 +30,12 @@ REASONS = {
 }
 
 
-def main(golden: Path, tables: list[str]) -> int:
+def main(golden: Path, tables: list[str], every: tuple[int, int, int, int], out: Path | None) -> int:
     """Print medians and maxima, and every cell beyond its bar; 1 where there is one without a reason."""
     beyond = 0
+    listed: list[tuple[Cell, str]] = []
     for table in tables:
-        cells = list(compare(golden, table))
+        cells = list(compare(golden, table, every=every))
         for stepper in STEPPERS:
             for quantity in QUANTITIES:
                 errors = [c.error for c in cells if c.stepper == stepper and c.quantity == quantity]
@@ -45,14 +48,30 @@ def main(golden: Path, tables: list[str]) -> int:
                 beyond += 1
                 print(f"  median {100 * median:.3f} % is beyond {100 * BARS[table][0]:g} %")
         limit, reason = REASONS.get(table, (0.0, ""))
-        listed = [c for c in cells if c.error > BARS[table][1]]
-        for c in listed:
+        here = [c for c in cells if c.error > BARS[table][1]]
+        listed += [(c, reason if c.error <= limit else "") for c in here]
+        for c in here:
             print(f"  beyond {100 * BARS[table][1]:g} %: {100 * c.error:.2f} % {c}")
-        if reason and listed:
-            print(f"  {len(listed)} of {len(cells)} cells of {table}; reason: {reason}")
-        beyond += sum(c.error > limit for c in listed)
+        if reason and here:
+            print(f"  {len(here)} of {len(cells)} cells of {table}; reason: {reason}")
+        beyond += sum(c.error > limit for c in here)
+    if out is not None:
+        with out.open("w", newline="", encoding="utf-8") as file:
+            table_of = csv.writer(file, lineterminator="\n")
+            table_of.writerow([*Cell._fields, "error", "reason"])
+            for c, reason in listed:
+                numbers = [f"{x:.6g}" if isinstance(x, float) else x for x in c]
+                table_of.writerow([*numbers, f"{c.error:.4f}", reason])
     return 1 if beyond else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1]), sys.argv[2:] or list(SETS)))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("golden", type=Path, help="golden_srs.json")
+    parser.add_argument("tables", nargs="*", help=f"of {', '.join(SETS)} (default: all)")
+    parser.add_argument(
+        "--every", nargs=4, type=int, default=(1, 1, 1, 1), help="strides over fibres, pCa, recoveries, amplitudes"
+    )
+    parser.add_argument("--csv", type=Path, help="file for every cell beyond its bar, with its reason")
+    given = parser.parse_args()
+    sys.exit(main(given.golden, given.tables or list(SETS), tuple(given.every), given.csv))

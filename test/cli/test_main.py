@@ -96,6 +96,32 @@ def test_live_refuses_what_is_the_nodes(bag: Path, tmp_path: Path, capsys: pytes
     assert "--live leaves steps" in complaint(capsys, arguments)
 
 
+def test_live_refuses_changed_values(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["replay", str(bag), "--fiber", "18Dec2017a", "--out", str(tmp_path), "--live", "--set", "f=200"]
+    assert "--live gives the node" in complaint(capsys, arguments)
+
+
+def test_values_set_on_the_command_line_are_used(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    force = []
+    for i, change in enumerate((["--set", "f=100"], ["--set", "f=200", "--set", "kon=50"])):
+        out = tmp_path / str(i)
+        assert main(["replay", str(bag), "--fiber", "18Dec2017a", "--out", str(out), *change]) == 0
+        force.append(json.loads((out / "replay.json").read_text())["trials"][0]["rmsd_f0"]["whole"])
+    assert abs(force[0] - force[1]) > 0.01
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ("bins=100", "has no parameter 'bins'"),
+        ("koff=-1", "parameter 'koff' is -1"),
+        ("kof=1", "did you mean 'koff'"),
+    ],
+)
+def test_values_that_cannot_be_set(capsys: pytest.CaptureFixture[str], change: str, words: str) -> None:
+    assert words in complaint(capsys, ["parameters", "--fiber", "18Dec2017a", "--set", change])
+
+
 def test_parameters_are_listed_with_unit_and_range(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["parameters", "--fiber", "18Dec2017a"]) == 0
     line = next(x for x in capsys.readouterr().out.splitlines() if x.startswith("kon "))

@@ -24,6 +24,8 @@ from xb_muscle_ros.trials.protocol import StretchShortenStretch
 _DURATION_S = 2.34
 _STEP_S = 1e-4
 _PCA = 6.1
+# Right-hand sides in a step: the moments' stepper and the grids' both take two.
+_EVALUATIONS = 2
 REFERENCE_BINS = 10000
 BINS = (25, 50, 100, 200, 400, 1000, 2000)
 RANGES = (4.0, 7.0, 15.0, 30.0)
@@ -106,9 +108,7 @@ class Study:
             states, steps = muscle.run_counted(start, dt, self.length, self.held, every=10)
             seconds.append(time.perf_counter() - begin)
         force = muscle.outputs_of(states)["force_f0"]
-        # Right-hand sides in a step of the moments' and of the grids' stepper.
-        evaluations = (3 if muscle.code.ORDER == 3 else 2) * steps
-        return Point(method, bins, strain_range, series, evaluations, float(np.median(seconds)), self._error(force))
+        return Point(method, bins, strain_range, series, _EVALUATIONS * steps, float(np.median(seconds)), self._error(force))
 
     def variable(self, tolerance: float) -> Point:
         """The Gaussian form with variable steps."""
@@ -125,7 +125,7 @@ class Study:
             )
             seconds.append(time.perf_counter() - begin)
         error = self._error(muscle.outputs_of(states)["force_f0"])
-        return Point("gaussian", 0, 0.0, "variable", 3 * steps, float(np.median(seconds)), error)
+        return Point("gaussian", 0, 0.0, "variable", _EVALUATIONS * steps, float(np.median(seconds)), error)
 
     def points(self) -> Iterator[Point]:
         """All points, cheapest method first."""

@@ -42,6 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise UserError(f"--settle is {arguments.settle:g} s; allowed is above 0 to 1e6")
     if arguments.live and (arguments.substeps != 1 or arguments.settle is not None):
         raise UserError("--live leaves steps and settling to the node; drop --substeps and --settle")
+    if arguments.live and arguments.changes:
+        raise UserError("--live gives the node a fibre file as it is; put the values of --set into a file of your own")
     fibre = fibre_of(arguments)
     trials = [read_trial(path) for path in find_bags(arguments.bags)]
     for trial in trials:

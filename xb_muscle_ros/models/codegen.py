@@ -50,7 +50,7 @@ def module_text(model: Model, smooth: bool) -> str:
     return model.module_text(smooth)
 
 
-def header(model: Model, smooth: bool, order: int) -> str:
+def header(model: Model, smooth: bool, order: int, interpolated: bool) -> str:
     """Head of a generated module: imports, and the constants that the loops of `stepping.kernels` use."""
     head = _HEADER.format(name=model.name, smooth=" with smooth functions" if smooth else "")
     constants = [
@@ -58,6 +58,7 @@ def header(model: Model, smooth: bool, order: int) -> str:
         "MAX_ATTEMPTS = 20000",
         f"EXPONENT = {1.0 / order!r}",
         f"SMALL_ERROR = {(0.9 / 5.0) ** order!r}",
+        f"INTERPOLATED = {interpolated}",
         f"ORDER = {order}",
         f"OUTPUTS = {OUTPUTS!r}",
     ]
@@ -69,7 +70,7 @@ def flat_module(model: Model, smooth: bool) -> str:
     e = model.equations(smooth)
     prepare = function("prepare(p)", "Parameters and what is computed from them once.", ["return p.copy()"])
     stay = function("regrid(s, p, work)", "Moments need no grid.", ["pass"])
-    parts = [header(model, smooth, ros3.ORDER), prepare, stay, _rhs(e), _attempt(e), _slope(e)]
+    parts = [header(model, smooth, ros3.ORDER, interpolated=True), prepare, stay, _rhs(e), _attempt(e), _slope(e)]
     parts += [vector("rest", e.parameters, e.rest), _outputs(e), _violation(e, smooth)]
     return "\n\n".join(parts) + "\n\n\n" + kernels() + "\n"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -103,7 +103,29 @@ def load_fibre(name_or_path: str | Path, model: str | None = None, method: str |
         )
     flat = dict(_flatten(inner, ""))
     fibre = fibre_from_parameters(flat, f"fibre file {path}", model, method)
-    return Fibre(**{**fibre.__dict__, "path": path})
+    return replace(fibre, path=path)
+
+
+def changed(fibre: Fibre, changes: Mapping[str, object], where: str) -> Fibre:
+    """The fibre with other values for some of its model's parameters.
+
+    Args:
+        fibre: stays as it is.
+        changes: by name; each one must be a parameter that the fibre's model and method use.
+        where: what the messages call the source of the changes.
+
+    Raises:
+        UserError: a name that model and method do not use, or a value out of range.
+    """
+    values = dict(fibre.values)
+    for name, value in changes.items():
+        if name not in values:
+            raise UserError(
+                f"{where}: model {fibre.model} with method {fibre.method} has no parameter '{name}'"
+                f"{suggest(name, values)}"
+            )
+        values[name] = checked(name, value, PARAMETERS, where)
+    return replace(fibre, values=MappingProxyType(values))
 
 
 def _flatten(tree: Mapping[object, object], prefix: str) -> Iterator[tuple[str, object]]:

@@ -37,7 +37,8 @@ def grid_module(model: Composition, smooth: bool, remap: str) -> str:
         f"TORN = {_torn_state(e)!r}\n"
         f"BINS, RANGE, REGRID = {index['bins']}, {index['strain_range']}, {index.get('regrid', -1)}\n"
     )
-    parts = [header(model, smooth, ros2.ORDER) + constants, _rate_constants(e), _factors(e), _spreads(e), _leave(e)]
+    head = header(model, smooth, ros2.ORDER, interpolated=False)
+    parts = [head + constants, _rate_constants(e), _factors(e), _spreads(e), _leave(e)]
     parts += [_others(e), _couplings(e), vector("rest_of_others", e.parameters, e.rest), _output_scalars(e), _bounds(e)]
     parts.append(_kernels(remap))
     return "\n\n".join(parts) + "\n\n\n" + kernels() + "\n"

@@ -9,6 +9,7 @@ scratch `work`, rows 0 to 3 belong to these loops, the others to the model.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -37,20 +38,25 @@ outputs: Callable[[Array, Array, Array], None]
 violation: Callable[[Array, Array, float], int]
 
 
+# Whether states between steps are interpolated. A stiff strain bin's slope at the end of a step is what is left of its
+# error times its rate: too much to interpolate with, so steps on grids land on the samples.
+INTERPOLATED = True
+
+
 # BEGIN COMPILED
 def growth(error: float, tol: float) -> float:
     """How much longer the next step may be after one whose error is within the tolerance: 0.9 to 5."""
     # The power costs a tenth of a step, and with fixed steps the error hardly ever comes near the tolerance.
     if error <= SMALL_ERROR * tol:
         return 5.0
-    return 0.9 * (tol / error) ** EXPONENT
+    return 0.9 * math.pow(tol / error, EXPONENT)
 
 
 def shrinkage(error: float, tol: float) -> float:
     """How much shorter a step has to be after one whose error is beyond the tolerance: 0.1 to 0.7."""
     if not error < 1e300:
         return 0.25
-    return min(0.7, max(0.1, 0.9 * (tol / error) ** EXPONENT))
+    return min(0.7, max(0.1, 0.9 * math.pow(tol / error, EXPONENT)))
 
 
 def advance(
@@ -189,7 +195,9 @@ def follow(
     s: Array, corner: Array, length: Array, calcium: Array, sample: Array, p: Array, first_h: float, tol: float,
     out: Array, work: Array,
 ) -> Any:  # fmt: skip
-    """Variable steps between the corners of a protocol, landing on each; samples by cubic interpolation (order 3).
+    """Variable steps between the corners of a protocol, landing on each.
+
+    Samples are interpolated (cubic, order 3) or, on strain grids, landed on as well.
 
     Args:
         s: state at corner[0].
@@ -227,7 +235,10 @@ def follow(
         t = 0.0
         in_interval = 0
         while t < dt:
-            rest = dt - t
+            stop = dt
+            if not INTERPOLATED and next_sample < samples and sample[next_sample] - begin < dt:
+                stop = sample[next_sample] - begin
+            rest = stop - t
             wanted = h
             if h > rest * 0.999999:
                 h = rest
@@ -248,34 +259,40 @@ def follow(
                     return code, fault, begin + t, tried, taken
                 continue
             taken += 1
-            end = dt if h == rest else t + h
-            at_corner = end == dt
-            if next_sample < samples and (
-                sample[next_sample] < begin + end or (at_corner and sample[next_sample] <= corner[k])
+            landed = h == rest
+            end = stop if landed else t + h
+            until = next_sample
+            while until < samples and (
+                sample[until] - begin < end
+                or (landed and (sample[until] - begin == end or (end == dt and sample[until] <= corner[k])))
             ):
+                until += 1
+            if INTERPOLATED and until > next_sample:
                 slope(here, velocity, calcium[k], p, before)
                 slope(there, velocity, calcium[k], p, after)
-                while next_sample < samples and (
-                    sample[next_sample] < begin + end or (at_corner and sample[next_sample] <= corner[k])
-                ):
-                    x = (sample[next_sample] - begin - t) / h
+            for j in range(next_sample, until):
+                x = (sample[j] - begin - t) / h
+                if INTERPOLATED:
                     a = (1.0 + 2.0 * x) * (1.0 - x) * (1.0 - x)
                     b = x * (1.0 - x) * (1.0 - x) * h
                     c = x * x * (3.0 - 2.0 * x)
                     d = x * x * (x - 1.0) * h
                     for i in range(n - 3):
-                        out[next_sample, i] = a * here[i] + b * before[i] + c * there[i] + d * after[i]
-                    out[next_sample, n - 3] = length[k - 1] + velocity * (t + x * h)
-                    out[next_sample, n - 2] = velocity
-                    out[next_sample, n - 1] = calcium[k]
-                    next_sample += 1
+                        out[j, i] = a * here[i] + b * before[i] + c * there[i] + d * after[i]
+                else:
+                    for i in range(n - 3):
+                        out[j, i] = there[i]
+                out[j, n - 3] = length[k - 1] + velocity * (t + x * h)
+                out[j, n - 2] = velocity
+                out[j, n - 1] = calcium[k]
+            next_sample = until
             for i in range(n - 3):
                 here[i] = there[i]
             regrid(here, p, work)
             t = end
             grown = h * growth(error, tol)
-            # A step cut short by the corner says little about the next one.
-            h = max(grown, wanted) if at_corner else grown
+            # A step cut short by a corner or a sample says little about the next one.
+            h = max(grown, wanted) if landed else grown
     return OK, -1, corner[corner.shape[0] - 1], tried, taken
 
 

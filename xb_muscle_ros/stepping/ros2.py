@@ -14,5 +14,5 @@ import math
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)
 ORDER = 2
 # The embedded error is of order 1 and far above the error of the step itself: counted in full it would cut steps of
-# 1 ms to a few µs. A tenth of it keeps forces within 0.01 % F0 at the fixed stepper's guard.
-ERROR_SHARE = 0.1
+# 1 ms to a few µs. A fifth of it keeps forces within 0.03 % F0 at the fixed stepper's guard.
+ERROR_SHARE = 0.2
