@@ -32,6 +32,7 @@ def trial() -> Trial:
             f0_n=0.0007,
             phases=(Phase("isometric", 0.0, 0.0015), Phase("test_stretch", 0.0015, 0.004)),
             source="made up: 'quoted' # no comment",
+            data_set="set_1",
         ),
         time_s=time_s,
         length_m=0.0005717 * (1.0 + 0.4545 * time_s),

@@ -91,7 +91,7 @@ def test_a_triangle_is_stretch_and_shortening() -> None:
     corners = [0.0, 0.1, 0.25, 0.4, 0.5]
     time_s = np.arange(500) / 1000
     phases = detect_phases(time_s, np.interp(time_s, corners, [1.0, 1.0, 1.064, 1.0, 1.0]))
-    assert [phase.name for phase in phases] == ["isometric", "stretch", "shortening", "isometric"]
+    assert [phase.name for phase in phases] == ["isometric", "stretch", "shortening", "recovery"]
     assert [phase.start_s for phase in phases] == pytest.approx(corners[:-1], abs=1e-5)
 
 
@@ -109,6 +109,74 @@ def test_a_glitch_is_no_ramp() -> None:
     phases = detect_phases(time_s, length)
     assert [phase.name for phase in phases] == NAMES
     assert phases[4].start_s == pytest.approx(corners[4], abs=1e-3)
+
+
+def test_a_release_and_restretch_is_told() -> None:
+    corners = [0.0, 0.5, 0.501, 0.521, 0.522, 2.0]
+    time_s = np.arange(5000) / 2500
+    length = np.interp(time_s, corners, [1.0, 1.0, 0.8, 0.8, 1.0, 1.0])
+    phases = detect_phases(time_s, length + 1e-4 * np.random.default_rng(5).standard_normal(time_s.size))
+    assert [phase.name for phase in phases] == ["isometric", "release", "hold", "stretch", "recovery"]
+    assert [phase.start_s for phase in phases] == pytest.approx(corners[:-1], abs=8e-4)
+
+
+def test_a_release_that_stays_is_recovered_from() -> None:
+    time_s = np.arange(1000) / 1000
+    phases = detect_phases(time_s, np.interp(time_s, [0, 0.5, 0.51, 1.0], [1.0, 1.0, 0.98, 0.98]))
+    assert [phase.name for phase in phases] == ["isometric", "release", "recovery"]
+    slow = detect_phases(time_s, np.interp(time_s, [0, 0.5, 0.54, 1.0], [1.0, 1.0, 0.98, 0.98]))
+    assert [phase.name for phase in slow] == ["isometric", "shortening", "recovery"]
+
+
+def test_a_step_is_told_from_the_ramp_that_follows() -> None:
+    corners = [0.0, 0.5, 0.51, 0.61, 1.0]
+    time_s = np.arange(1000) / 1000
+    phases = detect_phases(time_s, smoothed(np.interp(time_s, corners, [1.0, 1.0, 0.95, 0.85, 0.85]), 5), l0=1.0)
+    assert [phase.name for phase in phases] == ["isometric", "release", "shortening", "recovery"]
+    assert [phase.start_s for phase in phases] == pytest.approx(corners[:-1], abs=2e-3)
+
+
+def test_levels_after_stretch_and_shortening_have_their_names() -> None:
+    time_s = np.arange(2000) / 1000
+    corners = [0.0, 0.3, 0.4, 0.7, 0.8, 1.1, 1.2, 2.0]
+    phases = detect_phases(time_s, np.interp(time_s, corners, [1.0, 1.0, 1.1, 1.1, 1.05, 1.05, 1.0, 1.0]))
+    names = ["isometric", "stretch", "hold", "shortening", "recovery", "shortening", "recovery"]
+    assert [phase.name for phase in phases] == names
+
+
+GIVE = {"time": [0.3, 0.32, 0.4, 0.41, 0.43, 0.46], "length": [0.0, -0.012, 0.0, 0.0, 0.02, 0.0]}
+
+
+def test_a_motor_that_gives_makes_no_ramps() -> None:
+    time_s = np.arange(1000) / 1000
+    give = np.interp(time_s, GIVE["time"], GIVE["length"])
+    assert len(detect_phases(time_s, 1.0 + give)) > 1
+    assert detect_phases(time_s, 1.0 + give, servo_give=0.03) == (Phase("isometric", 0.0, 0.999),)
+
+
+def test_a_release_smaller_than_the_give_is_seen_as_it_stays() -> None:
+    time_s = np.arange(1000) / 1000
+    length = 1.0 + np.interp(time_s, GIVE["time"], GIVE["length"]) + np.interp(time_s, [0.7, 0.71], [0.0, -0.015])
+    phases = detect_phases(time_s, length, servo_give=0.03)
+    assert [phase.name for phase in phases] == ["isometric", "release", "recovery"]
+    assert phases[1].start_s == pytest.approx(0.7, abs=2e-3)
+
+
+def test_a_ramp_that_falters_by_the_give_is_one_ramp() -> None:
+    time_s = np.arange(1000) / 1000
+    ramp = np.interp(time_s, [0.0, 0.2, 0.5, 0.53, 0.8, 1.0], [1.0, 1.0, 0.9, 0.9, 0.8, 0.8])
+    names = [phase.name for phase in detect_phases(time_s, ramp, servo_give=0.012)]
+    assert names == ["isometric", "shortening", "recovery"]
+    apart = [phase.name for phase in detect_phases(time_s, ramp)]
+    assert apart == ["isometric", "shortening", "recovery", "shortening", "recovery"]
+
+
+def test_a_record_that_ends_as_the_motor_sets_off_has_no_ramp_there() -> None:
+    time_s, length, _ = protocol(0.0383, 0.1)
+    length[-4:] += [0.005, 0.012, 0.02, 0.028]
+    phases = detect_phases(time_s, length)
+    assert [phase.name for phase in phases] == NAMES
+    assert phases[-1].end_s == time_s[-1]
 
 
 def test_initial_isometric_keeps_away_from_the_stretch() -> None:

@@ -1,24 +1,25 @@
-"""``xb_muscle import``: recordings in CSV or TSV become bags, one for each trial."""
+"""``xb_muscle import``: recordings of any lab become bags, one for each trial."""
 
 from __future__ import annotations
 
 import argparse
-import re
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.bags import write_trial
-from xb_muscle_ros.trials.readers.csv import read_csv
-from xb_muscle_ros.trials.readers.mapping import ImportMapping, build_mapping, load_mapping
 from xb_muscle_ros.trials.readers.units import KINDS, UNITS
-from xb_muscle_ros.trials.trial import Trial
 
 if TYPE_CHECKING:
+    from xb_muscle_ros.progress import Progress
+    from xb_muscle_ros.trials.importing import Imported
+    from xb_muscle_ros.trials.readers.settings import ImportSettings
+    from xb_muscle_ros.trials.trial import Trial
+
     Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
 
+# Names of the readers; the readers themselves take time to load.
+FORMATS = ("bag", "csv", "mat", "slc")
 # option: (key of the mapping, argument type, help)
 _OPTIONS: dict[str, tuple[tuple[str, ...], type, str]] = {
     "--fiber": (("fibre",), str, "name of the fibre"),
@@ -57,13 +58,15 @@ def add(subparsers: Subparsers) -> None:
     )
     parser = subparsers.add_parser(
         "import",
-        help="make bags of recordings in CSV or TSV",
-        description="Make a bag of each recording. Columns and units come from a mapping file, from options, or from "
-        "both; options go first.",
-        epilog=f"Units of {units}.",
+        help="make bags of recordings in CSV, MATLAB, SLControl or other bags",
+        description="Make a bag of each trial. Columns and units come from a mapping file, from options, or from both; "
+        "options go first. A bag that was made of the same file with the same mapping is kept, so a run that was "
+        "stopped goes on where it was. A file that cannot be read is named and left out.",
+        epilog=f"Units of {units}. Exit code: 0 all is well, 1 some files were left out, 2 nothing was imported.",
     )
-    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="CSV or TSV file with a header line")
+    parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="recording, bag, or folder of such")
     parser.add_argument("--mapping", type=Path, metavar="YAML", help="columns, units and facts of the data set")
+    parser.add_argument("--format", choices=FORMATS, help="format of the files (default: what each looks like)")
     parser.add_argument(
         "--out", type=Path, default=Path("bags"), metavar="DIR", help="folder of the bags (default: bags)"
     )
@@ -75,54 +78,67 @@ def add(subparsers: Subparsers) -> None:
         help="scale each trial's force to the isometric trial of its pCa (default: where the mapping has the table)",
     )
     parser.add_argument("--overwrite", action="store_true", help="replace bags that exist")
+    parser.add_argument("--strict", action="store_true", help="stop at the first file or trial that cannot be imported")
     parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Import the files; nothing is written unless all of them can be read.
+    """Import the files one after another.
+
+    Returns:
+        0, 1 where some files or trials were left out, 2 where nothing was imported.
 
     Raises:
-        UserError: anything the user has to mend.
+        UserError: a mapping or an option is wrong, or with ``--strict`` anything is.
     """
-    mapping = _mapping(args)
-    trials = [(path, read_csv(path, mapping, args.isometric_scaling)) for path in args.files]
-    bags = [args.out / bag_name(mapping.data_set, path.stem) for path in args.files]
-    for i, bag in enumerate(bags):
-        if bag in bags[:i]:
-            raise UserError(
-                f"{args.files[i]} and {args.files[bags.index(bag)]} would both become {bag}; import one at a time"
-            )
-        if bag.exists() and not args.overwrite:
-            raise UserError(f"bag {bag} exists; use --overwrite to replace it or --out for another folder")
-    for (_, trial), bag in zip(trials, bags, strict=True):
-        write_trial(bag, trial)
-        print(_line(bag, trial))
-        for warning in trial.warnings:
-            print(f"  warning: {warning}")
-    return 0
+    from xb_muscle_ros.progress import Progress
+    from xb_muscle_ros.trials.importing import Failed, FileDone, Kept, find_recordings, import_recordings
+
+    settings = _settings(args)
+    files = find_recordings(args.files, args.out)
+    imported = kept = failed = 0
+    with Progress(len(files), "import") as progress:
+        for event in import_recordings(files, settings, args.out, args.overwrite):
+            if isinstance(event, FileDone):
+                progress.update()
+            elif isinstance(event, Failed):
+                if args.strict:
+                    raise UserError(event.why)
+                failed += 1
+                progress.write(f"xb_muscle: error: {event.why}", file=sys.stderr)
+            elif isinstance(event, Kept):
+                kept += 1
+                progress.write(f"{event.bag}: kept, made of the same file with the same mapping")
+            else:
+                imported += 1
+                _tell(event, progress)
+    print(f"{imported} imported, {kept} kept, {failed} left out")
+    return 0 if not failed else 1 if imported + kept else 2
 
 
-def bag_name(data_set: str, trial: str) -> str:
-    """Name of a trial's bag: data set and trial, in characters every file system and shell takes."""
-    name = trial if trial.startswith(data_set) else f"{data_set}_{trial}"
-    return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).lstrip(".-")
-
-
-def _mapping(args: argparse.Namespace) -> ImportMapping:
+def _settings(args: argparse.Namespace) -> ImportSettings:
     """The mapping file with the options put over it."""
+    from xb_muscle_ros.trials.readers.mapping import load_mapping
+    from xb_muscle_ros.trials.readers.settings import ImportSettings
+
     tree: dict[str, Any] = load_mapping(args.mapping) if args.mapping is not None else {}
     where = "options" if args.mapping is None else f"mapping {args.mapping}"
+    overrides: dict[str, Any] = {}
     for key, _, _ in _OPTIONS.values():
         value = getattr(args, ".".join(key))
         if value is None:
             continue
-        branch = tree
+        branch = overrides
         for part in key[:-1]:
             branch = branch.setdefault(part, {})
-            if not isinstance(branch, dict):
-                raise UserError(f"{where}: {part} is {branch!r}; needed are keys with values")
         branch[key[-1]] = value
-    return build_mapping(tree, where)
+    return ImportSettings(tree, where, args.format, args.isometric_scaling, overrides)
+
+
+def _tell(event: Imported, progress: Progress) -> None:
+    progress.write(_line(event.bag, event.trial))
+    for warning in event.trial.warnings:
+        progress.write(f"  warning: {warning}")
 
 
 def _line(bag: Path, trial: Trial) -> str:
@@ -139,6 +155,6 @@ def _line(bag: Path, trial: Trial) -> str:
     if facts.recovery_s is not None:
         parts.append(f"recovery {facts.recovery_s:g} s")
     if trial.force_n.size:
-        parts.append(f"force {np.min(trial.measured_f0):.3f} to {np.max(trial.measured_f0):.3f} F0")
+        parts.append(f"force {trial.measured_f0.min():.3f} to {trial.measured_f0.max():.3f} F0")
     parts.append(" ".join(f"{phase.name}@{phase.start_s:.4f}" for phase in facts.phases))
     return f"{bag}: {', '.join(parts)}"

@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials import fast_yaml
 from xb_muscle_ros.trials.bag_files import METADATA, mcap_files
 from xb_muscle_ros.trials.mcap_records import Message, read_recording
 
@@ -86,7 +87,7 @@ def _information(path: Path) -> tuple[dict[str, Any] | None, list[str]]:
 def _parsed(text: str) -> dict[str, Any] | None:
     """The bag information of a metadata text, every scalar as the text it is; None if it has none."""
     try:
-        loaded = yaml.load(text, Loader=yaml.BaseLoader)  # scalars stay text, so a trial named 1_0 keeps its name
+        loaded = fast_yaml.load_text(text)  # scalars stay text, so a trial named 1_0 keeps its name
     except (yaml.YAMLError, ValueError):
         return None
     if isinstance(loaded, dict):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -57,6 +59,29 @@ def check_replaceable(path: Path) -> None:
         raise UserError(
             f"bag {path} cannot be written: it holds '{foreign[0]}', which belongs to no bag; choose another name"
         )
+
+
+def clear_leftovers(folder: Path) -> None:
+    """Undo what a killed run left half done in a folder of bags: parts of a bag go, an older bag comes back."""
+    for left in list(folder.glob(".*.tmp")) + list(folder.glob(".*.old")):
+        match = re.fullmatch(r"\.(.+)\.(\d+)\.(tmp|old)", left.name)
+        if match is None or not left.is_dir() or _runs(int(match.group(2))):
+            continue
+        bag = folder / match.group(1)
+        if match.group(3) == "old" and not bag.exists():
+            left.rename(bag)
+        else:
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:  # it is another user's
+        return True
+    return True
 
 
 def is_bag(path: Path) -> bool:

@@ -11,10 +11,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import yaml
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.enums import CompressionMode
 from rosbags.rosbag2.storage_mcap import McapWriter
+
+from xb_muscle_ros.trials import fast_yaml
 
 
 class _Mcap(McapWriter):
@@ -61,7 +62,6 @@ class BagWriter(Writer):
 
 def _with_facts(text: str, facts: dict[str, str]) -> str:
     """The metadata with ``custom_data`` put in, every value on one line."""
-    tree: dict[str, Any] = yaml.safe_load(text)
+    tree: dict[str, Any] = fast_yaml.load(text)
     tree.get("rosbag2_bagfile_information", tree)["custom_data"] = facts
-    dumped: str = yaml.safe_dump(tree, width=float("inf"), allow_unicode=True, sort_keys=True)
-    return dumped
+    return fast_yaml.dump(tree)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,7 +27,9 @@ class _Series(NamedTuple):
     message: Callable[[int], bytes]
 
 
-def write_trial(path: Path, trial: Trial, simulated: Simulated | None = None) -> None:
+def write_trial(
+    path: Path, trial: Trial, simulated: Simulated | None = None, more: Mapping[str, str] | None = None
+) -> None:
     """Write a trial, and with it what a model answered, as a bag folder.
 
     The folder appears whole or not at all; an older bag of that name is replaced.
@@ -36,6 +38,7 @@ def write_trial(path: Path, trial: Trial, simulated: Simulated | None = None) ->
         path: the bag folder; it gets ``metadata.yaml`` and ``<name>_0.mcap``.
         trial: at least one length and one calcium sample.
         simulated: force and moments to write beside it.
+        more: strings to keep in the bag's ``custom_data`` beside the trial's facts.
 
     Raises:
         UserError: the path holds something that is not a bag, or the trial cannot be a bag (empty, non-finite,
@@ -44,7 +47,7 @@ def write_trial(path: Path, trial: Trial, simulated: Simulated | None = None) ->
     path = Path(path)
     check_replaceable(path)
     series = _series(trial, simulated, str(path))
-    custom_data = facts_to_custom_data(trial.facts)
+    custom_data = {**(more or {}), **facts_to_custom_data(trial.facts)}
     temporary = path.parent / f".{path.name}.{os.getpid()}.tmp"
     old = path.parent / f".{path.name}.{os.getpid()}.old"
     shutil.rmtree(temporary, ignore_errors=True)  # of a run that was killed

@@ -6,27 +6,28 @@ Lines fitted to the middles of the pieces are free of both, so a corner is taken
 
 from __future__ import annotations
 
-import itertools
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from xb_muscle_ros.trials.runs import LASTING_SAMPLES, Run, merge, split, with_steps, without_departure, without_give
 from xb_muscle_ros.trials.trial import Array
 
 # A slope belongs to a ramp above this fraction of the fastest slope, so that halves of rounded corners are split.
 RAMP_FRACTION = 0.3
 # The slope's noise (standard deviation) has to be this much smaller than the fastest slope.
 NOISE_FRACTION = 0.08
-# A slope has to last this many samples to count as the fastest.
-LASTING_SAMPLES = 6
 # Half-windows of the slope estimate, samples; the smallest quiet enough is used, so that short ramps stay visible.
 HALF_WINDOWS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
 # Ramps below these are wobble: relative to the largest ramp, and to the length itself.
 SMALLEST_RAMP = 0.01
 SMALLEST_STRAIN = 3e-4
+# Beside much faster ramps, a slow one is looked for where a level ends this much (L0) off its begin.
+SLOW_STRAIN = 5e-3
 # A pause of fewer samples cannot be told from a rounded corner: filters and motors round over some 12 ms at 1 kHz.
 SHORTEST_PAUSE = 9
+# A ramp of few samples begins and ends where it is this near its levels, as part of its rise.
+STEP_EDGE = 0.05
 # A level next to a corner is taken from at most this many samples, so that slow drift further away does not count.
 LEVEL_SAMPLES = 100
 
@@ -47,29 +48,25 @@ class Piece(NamedTuple):
     line: tuple[float, float]
 
 
-class _Run(NamedTuple):
-    direction: int
-    first: int
-    last: int  # inclusive
-
-    @property
-    def samples(self) -> int:
-        return self.last - self.first + 1
-
-
-def straight_pieces(time_s: Array, length: Array) -> list[Piece]:
+def straight_pieces(time_s: Array, length: Array, l0: float | None = None, servo_give: float = 0.0) -> list[Piece]:
     """Split a length record into straight pieces.
 
     Args:
         time_s: shape (n,), strictly increasing, s.
         length: shape (n,), length (not its change) in any unit.
+        l0: the length that is L0, in that unit; None for the median of the record.
+        servo_give: changes of length up to this that come back are no ramps, in that unit.
 
     Returns:
         Pieces in order of time that touch each other and cover the whole record; the level of an isometric piece is
         its line's offset.
     """
+    l0 = float(np.median(length)) if l0 is None else l0
     slope, half_window = _quiet_slope(time_s, length)
     runs = _ramp_runs(length, slope, half_window)
+    runs = merge([part for run in runs for part in _slower_ramps(run, time_s, length, l0)])
+    runs = without_give(without_departure(runs), length, servo_give)
+    runs = with_steps(runs, time_s, length, l0)
     lines = [_line(time_s, length, run, half_window) for run in runs]
     corners = [float(time_s[0])]
     for left, right, after in zip(range(len(runs)), range(1, len(runs)), runs[1:], strict=False):
@@ -94,7 +91,8 @@ def _quiet_slope(time_s: Array, length: Array) -> tuple[Array, int]:
         fastest = _fastest(slope)
         apart = slope[2 * half_window + 1 :] - slope[: -(2 * half_window + 1)]
         noise = 1.4826 * float(np.median(np.abs(apart))) / np.sqrt(2.0)
-        if noise <= NOISE_FRACTION * fastest:
+        # A step within a few samples lasts only as long as the window.
+        if fastest > 0.0 and noise <= NOISE_FRACTION * fastest:
             return slope, half_window
     return np.zeros_like(length), 1
 
@@ -120,42 +118,58 @@ def _slope(time_s: Array, length: Array, half_window: int) -> Array:
     return np.pad(inner, half_window, mode="edge")
 
 
-def _ramp_runs(length: Array, slope: Array, half_window: int) -> list[_Run]:
+def _ramp_runs(length: Array, slope: Array, half_window: int) -> list[Run]:
     """Runs of samples with one direction; wobble and pauses shorter than the slope's window are not runs."""
     fastest = _fastest(slope)
     moving = np.abs(slope) > RAMP_FRACTION * fastest if fastest > 0.0 else np.zeros(slope.size, dtype=bool)
-    runs = _split((np.sign(slope) * moving).astype(np.int64))
+    runs = split((np.sign(slope) * moving).astype(np.int64))
     rise = [abs(float(length[run.last] - length[run.first])) if run.direction else 0.0 for run in runs]
     smallest = max(SMALLEST_RAMP * max(rise), SMALLEST_STRAIN * abs(float(np.median(length))))
-    runs = _merge([run if up >= smallest else run._replace(direction=0) for run, up in zip(runs, rise, strict=True)])
+    runs = merge([run if up >= smallest else run._replace(direction=0) for run, up in zip(runs, rise, strict=True)])
     shortest_pause = max(SHORTEST_PAUSE, 2 * half_window + 1)
     # The samples of shorter pauses belong to no piece: neither line is fitted to them.
     seen = [run for run in runs if run.direction or run.samples >= shortest_pause]
-    return _merge(seen or runs)
+    return [_sharpened(run, length, half_window) for run in merge(seen or runs)]
 
 
-def _split(directions: npt.NDArray[np.int64]) -> list[_Run]:
-    edges = [0, *(np.flatnonzero(np.diff(directions)) + 1).tolist(), directions.size]
-    return [_Run(int(directions[a]), a, b - 1) for a, b in itertools.pairwise(edges)]
+def _sharpened(run: Run, length: Array, half_window: int) -> Run:
+    """A ramp shorter than the slope's window without the samples of the levels beside it."""
+    if run.direction == 0 or not 1 < run.samples <= 4 * half_window + 2:
+        return run
+    part = length[run.first : run.last + 1]
+    low, high = sorted((float(part[0]), float(part[-1])))
+    margin = STEP_EDGE * (high - low)
+    inside = (part > low + margin) & (part < high - margin)
+    first = int(np.argmax(np.abs(np.diff(part))))  # a motor may ring after its step, but more slowly
+    last = first + 1
+    while first > 0 and inside[first]:
+        first -= 1
+    while last < part.size - 1 and inside[last]:
+        last += 1
+    return run._replace(first=run.first + first, last=run.first + last)
 
 
-def _merge(runs: list[_Run]) -> list[_Run]:
-    merged = runs[:1]
-    for run in runs[1:]:
-        if run.direction == merged[-1].direction:
-            merged[-1] = merged[-1]._replace(last=run.last)
-        else:
-            merged.append(run)
-    return merged
+def _slower_ramps(run: Run, time_s: Array, length: Array, l0: float) -> list[Run]:
+    """Runs within one that is isometric beside faster ramps, but ends elsewhere than it begins."""
+    edge = max(run.samples // 20, 3)
+    if run.direction != 0 or run.samples < 10 * LASTING_SAMPLES:
+        return [run]
+    part = length[run.first : run.last + 1]
+    if abs(float(np.median(part[-edge:]) - np.median(part[:edge]))) < SLOW_STRAIN * l0:
+        return [run]
+    slope, half_window = _quiet_slope(time_s[run.first : run.last + 1], part)
+    found = _ramp_runs(part, slope, half_window)
+    found[0], found[-1] = found[0]._replace(first=0), found[-1]._replace(last=part.size - 1)
+    return [Run(each.direction, run.first + each.first, run.first + each.last) for each in found]
 
 
-def _core(run: _Run, half_window: int) -> slice:
+def _core(run: Run, half_window: int) -> slice:
     """The samples of a run without its rounded ends."""
     trim = min(max(int(np.ceil(0.15 * run.samples)), half_window), run.samples // 4)
     return slice(run.first + trim, run.last + 1 - trim)
 
 
-def _line(time_s: Array, length: Array, run: _Run, half_window: int) -> tuple[float, float]:
+def _line(time_s: Array, length: Array, run: Run, half_window: int) -> tuple[float, float]:
     """Straight line (slope, offset) through the middle of a run; a level where the run is isometric."""
     core = _core(run, half_window)
     if run.direction == 0 or run.samples < 2:
@@ -166,7 +180,7 @@ def _line(time_s: Array, length: Array, run: _Run, half_window: int) -> tuple[fl
 
 
 def _facing_line(
-    time_s: Array, length: Array, run: _Run, line: tuple[float, float], half_window: int, *, at_end: bool
+    time_s: Array, length: Array, run: Run, line: tuple[float, float], half_window: int, *, at_end: bool
 ) -> tuple[float, float]:
     """The run's line, or for an isometric run the level of the samples nearest the corner."""
     if run.direction != 0:

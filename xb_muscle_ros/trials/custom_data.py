@@ -11,6 +11,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.trial import Phase, TrialFacts
 
 _CONTROL = ("Cc", "Cs", "Zl", "Zp")
+_TEXTS = ("fibre", "trial", "source", "data_set")
 _OPTIONAL_NUMBERS = ("pca", "amplitude_l0", "recovery_s")
 _POSITIVE_NUMBERS = ("reference_length_m", "f0_n")
 
@@ -23,11 +24,13 @@ def facts_to_custom_data(facts: TrialFacts) -> dict[str, str]:
     Raises:
         UserError: a text has a line break or another control character, which YAML readers do not agree on.
     """
-    for name in ("fibre", "trial", "source"):
+    for name in _TEXTS:
         bad = next((c for c in getattr(facts, name) if unicodedata.category(c) in _CONTROL), None)
         if bad is not None:
             raise UserError(f"{name} holds the control character {bad!r}; allowed is text on one line")
     data = {"fibre": facts.fibre, "trial": facts.trial, "source": facts.source}
+    if facts.data_set:
+        data["data_set"] = facts.data_set
     for name in _OPTIONAL_NUMBERS + _POSITIVE_NUMBERS:
         value = getattr(facts, name)
         if value is not None:
@@ -65,6 +68,7 @@ def facts_from_custom_data(data: Mapping[str, str], where: str, fibre: str, tria
         f0_n=positive.get("f0_n", 1.0),
         phases=_phases(data.get("phases", "[]"), where),
         source=data.get("source", ""),
+        data_set=data.get("data_set", ""),
     )
 
 

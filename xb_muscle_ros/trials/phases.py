@@ -1,8 +1,10 @@
 """Phases of a trial found from its length record: the paper's protocol, or stretches and shortenings by turns.
 
 The protocol is isometric, conditioning stretch, shortening back, recovery, test stretch, hold; without the first
-stretch (the reference trial) isometric, test stretch, hold. Anything else is told as ``isometric``, ``stretch`` and
-``shortening`` in order of time.
+stretch (the reference trial) isometric, test stretch, hold. Anything else is told in order of time as ``isometric``
+before the first change of length, ``stretch``, ``shortening`` or, where it is quick, ``release``, and between them
+``hold`` after a stretch and ``recovery`` after a shortening. Release and restretch (k_tr) are ``release``, ``hold``
+while slack, ``stretch`` and ``recovery``.
 """
 
 from __future__ import annotations
@@ -10,15 +12,25 @@ from __future__ import annotations
 import numpy as np
 
 from xb_muscle_ros.trials.corners import Piece, straight_pieces
+from xb_muscle_ros.trials.runs import RELEASE_L0_PER_S, RELEASE_S
 from xb_muscle_ros.trials.trial import Array, Phase
 
 _CONDITIONED = (1, -1, 1)
 _REFERENCE = (1,)
+# Between release and restretch there is no more time than this, s, and they end this near where they began (part of
+# the release).
+_SLACK_S = 0.2
+_BACK = 0.2
 _CONDITIONED_NAMES = ("conditioning_stretch", "shortening", "test_stretch")
 
 
 def detect_phases(
-    time_s: Array, length: Array, amplitude_l0: float | None = None, recovery_s: float | None = None
+    time_s: Array,
+    length: Array,
+    amplitude_l0: float | None = None,
+    recovery_s: float | None = None,
+    l0: float | None = None,
+    servo_give: float = 0.0,
 ) -> tuple[Phase, ...]:
     """Find the phases of a trial.
 
@@ -29,12 +41,16 @@ def detect_phases(
             in the record is then placed by the protocol, counting back from the test stretch at the same speed.
         recovery_s: the time between shortening and test stretch where it is known, s. A pause too short to be seen
             in the record then gets this duration around the corner in which it hides.
+        l0: the length that is L0, in the unit of length; None for the median of the record.
+        servo_give: changes of length up to this that come back are none: the motor gave under the muscle's force.
 
     Returns:
         Phases in order of time, touching each other, from the first sample to the last. Onsets of stretches are
         good to about a sample at 1 kHz, because they are where fitted lines meet.
     """
-    pieces = straight_pieces(np.asarray(time_s, dtype=np.float64), np.asarray(length, dtype=np.float64))
+    length = np.asarray(length, dtype=np.float64)
+    l0 = float(np.median(length)) if l0 is None else l0
+    pieces = straight_pieces(np.asarray(time_s, dtype=np.float64), length, l0, servo_give)
     ramps = tuple(piece.direction for piece in pieces if piece.direction)
     if ramps == _CONDITIONED and all(piece.direction for piece in _between(pieces)):
         return _named(_with_pause(pieces, recovery_s), _CONDITIONED_NAMES)
@@ -46,8 +62,8 @@ def detect_phases(
             return _named(placed, _CONDITIONED_NAMES)
     if ramps == _REFERENCE:
         return _named(pieces, ("test_stretch",))
-    names = {1: "stretch", 0: "isometric", -1: "shortening"}
-    return tuple(Phase(names[piece.direction], piece.start_s, piece.end_s) for piece in pieces)
+    names = _names(pieces, l0)
+    return tuple(Phase(name, piece.start_s, piece.end_s) for name, piece in zip(names, pieces, strict=True))
 
 
 def initial_isometric(time_s: Array, phases: tuple[Phase, ...]) -> slice:
@@ -61,6 +77,35 @@ def initial_isometric(time_s: Array, phases: tuple[Phase, ...]) -> slice:
     first = phases[0]
     end_s = first.end_s if len(phases) == 1 else first.start_s + 0.8 * (first.end_s - first.start_s)
     return slice(0, int(np.searchsorted(time_s, end_s, side="right")))
+
+
+def _names(pieces: list[Piece], l0: float) -> list[str]:
+    """Names of pieces that are not the paper's protocol."""
+    names = []
+    for i, piece in enumerate(pieces):
+        if piece.direction > 0:
+            names.append("stretch")
+        elif piece.direction < 0:
+            names.append("release" if _is_release(piece, l0) else "shortening")
+        elif i == 0:
+            names.append("isometric")
+        else:
+            slack = names[-1] == "release" and _is_slack(pieces[i - 1 : i + 2])
+            restretched = names[-3:] == ["release", "hold", "stretch"]
+            names.append("hold" if slack or (names[-1] == "stretch" and not restretched) else "recovery")
+    return names
+
+
+def _is_release(piece: Piece, l0: float) -> bool:
+    return piece.end_s - piece.start_s <= RELEASE_S and abs(piece.line[0]) >= RELEASE_L0_PER_S * l0
+
+
+def _is_slack(pieces: list[Piece]) -> bool:
+    """Whether a release, a level and what follows are release, slack and restretch."""
+    if len(pieces) < 3 or pieces[2].direction <= 0 or pieces[1].end_s - pieces[1].start_s > _SLACK_S:
+        return False
+    down, up = (piece.line[0] * (piece.end_s - piece.start_s) for piece in (pieces[0], pieces[2]))
+    return abs(up + down) <= _BACK * abs(down)
 
 
 def _between(pieces: list[Piece]) -> list[Piece]:

@@ -18,7 +18,7 @@ class Phase:
 
     Attributes:
         name: ``isometric``, ``conditioning_stretch``, ``shortening``, ``recovery``, ``test_stretch`` or ``hold``;
-            triangles that are not the paper's protocol use ``stretch`` and ``shortening``.
+            records that are not the paper's protocol use ``stretch`` and ``release`` (a quick shortening) as well.
         start_s: begin, in the trial's own time, s.
         end_s: end, s; not before ``start_s``.
     """
@@ -41,7 +41,8 @@ class TrialFacts:
         reference_length_m: the length that is one L0 (rest), m.
         f0_n: the isometric force at pCa 4.5 that is one F0, N.
         phases: in order of time.
-        source: where the data come from, in words.
+        source: where the data come from, and what was done to them, in words.
+        data_set: name of the set of recordings the trial belongs to; empty where there is none.
     """
 
     fibre: str
@@ -53,6 +54,7 @@ class TrialFacts:
     f0_n: float = 1.0
     phases: tuple[Phase, ...] = ()
     source: str = ""
+    data_set: str = ""
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import copy
 import json
+import math
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.readers.mapping import build_mapping, load_mapping
+from xb_muscle_ros.trials.activation import CalciumTransient
+from xb_muscle_ros.trials.readers.mapping import BAG, build_mapping, load_mapping
 from xb_muscle_ros.trials.readers.units import Quantity
 
 TREE: dict[str, Any] = {
@@ -25,6 +27,9 @@ TREE: dict[str, Any] = {
     "amplitude_l0": 0.0383,
     "isometric_scaling": {"source": "a table", "fractions_f0": {4.5: 1.0, "6.1": "0.5"}},
 }
+
+
+ACTIVATION = {"rest": "0.05 uM", "tetanus": "5.1 pCa", "rise": "50 ms", "decay": "30 ms"}
 
 
 def _changed(*path: str, value: Any = None) -> dict[str, Any]:
@@ -82,6 +87,24 @@ def test_a_file_name_that_does_not_match_is_refused() -> None:
         (_changed("pca", value="low"), "pca is 'low'; needed is a finite number"),
         (_changed("isometric_scaling", "fractions_f0", value={4.5: -1}), "at pCa 4.5 is -1"),
         (_changed("isometric_scaling", "fractions_f0", value=[1, 2]), "needed is a table"),
+        (_changed("f0", value={"isometric_at": 4.5}), "unknown f0.isometric_at; did you mean 'isometric_at_pca'"),
+        (_changed("f0", value="96.7 Pa"), "f0 is 96.7 Pa; allowed is 1000 to 2e+06 Pa; is its unit right?"),
+        (_changed("columns", "length", "at_reference", value="40 mm"), "the reference length has to be given"),
+        (_changed("columns", "length", "at_reference", value="1 L0"), "at_reference has to be a length"),
+        (_changed("columns", "force", "zero", value="first"), "columns.force.zero is 'first'; allowed"),
+        (_changed("columns", "time", "largest_step", value="6"), "largest_step is '6'; needed is a number above 0"),
+        (_changed("phases", value={"give": "1 mm"}), "unknown phases.give; did you mean 'servo_give'"),
+        (_changed("phases", value={"servo_give": "1 L0"}), "phases.servo_give has to be a length"),
+        (_changed("columns", "stimulation", value={"column": "s", "unit": "V"}), "needs activation"),
+        (_changed("columns", "stimulation", value={"column": "s", "unit": "N"}), "'N' is no unit of stimulation"),
+        (_changed("activation", value={"rest": "0.05 uM"}), "activation: tetanus is missing; give a value"),
+        (_changed("activation", value=ACTIVATION), "neither tells when there is stimulation"),
+        (_changed("activation", value={**ACTIVATION, "rise": "5 uM"}), "'uM' is no unit of time"),
+        (_changed("activation", value={**ACTIVATION, "rest": "9 uM"}), "here: activation: rest is 9 µM"),
+        (_changed("activation", value={**ACTIVATION, "end": "2 s"}), "activation.end needs activation.begin"),
+        (_changed("activation", value={**ACTIVATION, "begin": "1 s"}), "activation.end is missing"),
+        (_changed("activation", value={**ACTIVATION, "begin": "2 s", "end": "1 s"}), "goes from 2 to 1 s"),
+        (_changed("activation", value={**ACTIVATION, "begin": "never"}), "so a calcium column and pCa have no use"),
     ],
 )
 def test_a_bad_tree_is_refused_with_a_remedy(tree: dict[str, Any], words: str) -> None:
@@ -89,6 +112,39 @@ def test_a_bad_tree_is_refused_with_a_remedy(tree: dict[str, Any], words: str) -
         build_mapping(tree, "here")
     assert words in str(refused.value)
     assert "here" in str(refused.value)
+
+
+def test_activation_takes_pca_and_times() -> None:
+    tree = _changed("file_name")
+    told = {**ACTIVATION, "begin": "1 s", "end": "force_drop", "source": "made\n  up"}
+    made = build_mapping({**tree, "activation": told}, "here").activation
+    assert made is not None
+    assert made.transient == CalciumTransient(0.05, 10.0 ** (6.0 - 5.1), 0.05, 0.03)
+    assert (made.source, made.begin_s, made.end_s) == ("made up", 1.0, None)
+    never = build_mapping({**tree, "activation": {**ACTIVATION, "begin": "never"}}, "here").activation
+    assert never is not None
+    assert never.begin_s == math.inf
+
+
+def test_names_may_come_from_file_and_folder() -> None:
+    made = build_mapping({**TREE, "fibre": "{folder}", "trial": "{folder}_{file}"}, "here")
+    file = Path("somewhere/rat7/cell_pca61.csv")
+    assert (made.fibre_of(file), made.trial_of(file), made.data_set_of(file)) == ("rat7", "rat7_cell_pca61", "rat7")
+
+
+def test_signals_of_a_bag_are_topics() -> None:
+    columns = {"length": {"topic": "/l", "field": "position[0]", "unit": "mm"}, "time": {"stamp": "log"}}
+    made = build_mapping({"fibre": "f", "pca": 6.1, "columns": columns}, "here", BAG)
+    assert made.length[:2] == ("/l", "mm")
+    assert made.length.field == "position[0]"
+    assert made.time.name == "log"
+    for change, words in (
+        ({"length": {"topic": "/l", "unit": "mm"}}, "field is missing; name the field of /l"),
+        ({"length": {"column": "l", "unit": "mm"}}, "unknown columns.length.column"),
+        ({"time": {"stamp": "sent"}}, "columns.time.stamp is 'sent'; allowed: header, log"),
+    ):
+        with pytest.raises(UserError, match=words):
+            build_mapping({"fibre": "f", "columns": {**columns, **change}}, "here", BAG)
 
 
 @pytest.mark.parametrize(

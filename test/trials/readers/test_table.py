@@ -46,6 +46,15 @@ def test_a_cell_that_is_no_finite_number_is_named(tmp_path: Path, cell: str, fou
         table.numbers("b")
 
 
+@pytest.mark.parametrize(
+    ("cells", "words"),
+    [("1 x x 2", "line 3.* holds 'x' .a run of 2 lines."), ("1 2 x x x", "line 4.*a run of 3 lines")],
+)
+def test_a_run_of_them_is_counted(tmp_path: Path, cells: str, words: str) -> None:
+    with pytest.raises(UserError, match=words):
+        read_table(_file(tmp_path, "\n".join(["a", *cells.split()]))).numbers("a")
+
+
 def test_a_short_line_is_named(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="line 3, column 'b' holds nothing"):
         read_table(_file(tmp_path, "a,b\n1,2\n3\n")).numbers("b")

@@ -39,19 +39,18 @@ class Table:
                 f"{_hint(column, self.header)}"
             )
         index = self.header.index(column)
-        values = np.empty(len(self.rows))
-        for i, (line, cells) in enumerate(self.rows):
-            text = cells[index].strip() if index < len(cells) else ""
-            try:
-                values[i] = float(text)
-            except ValueError:
-                values[i] = math.nan
-            if not math.isfinite(values[i]):
-                found = f"'{text}'" if text else "nothing"
-                raise UserError(
-                    f"{self.path}, line {line}, column '{column}' holds {found}; needed is a finite number; "
-                    "mend or remove the line"
-                )
+        texts = [cells[index].strip() if index < len(cells) else "" for _, cells in self.rows]
+        values: Array = np.array([_number(text) for text in texts])
+        bad = ~np.isfinite(values)
+        if bad.any():
+            first = int(np.argmax(bad))
+            run = int(np.argmin(bad[first:])) or bad.size - first
+            found = f"'{texts[first]}'" if texts[first] else "nothing"
+            more = f" (a run of {run} lines)" if run > 1 else ""
+            raise UserError(
+                f"{self.path}, line {self.line(first)}, column '{column}' holds {found}{more}; needed is a finite "
+                "number; mend or remove the line"
+            )
         return values
 
 
@@ -87,6 +86,13 @@ def read_table(path: Path) -> Table:
         raise UserError(f"{path} has a header line but no rows; needed are rows of numbers")
     rows = tuple((line, tuple(row)) for (line, _), row in zip(lines[1:], cells[1:], strict=True))
     return Table(path, header, rows)
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def _is_number(text: str) -> bool:

@@ -10,7 +10,7 @@ from xb_muscle_ros.errors import UserError, suggest
 
 
 class Unit(NamedTuple):
-    """A unit: what it measures and how many of the kind's base unit it is (s, m, L0, N, Pa, F0, µM)."""
+    """A unit: what it measures and how many of the kind's base unit it is (s, m, L0, N, Pa, F0, µM, V)."""
 
     kind: str
     factor: float
@@ -51,17 +51,21 @@ UNITS = {
     "nM": Unit("calcium", 1e-3),
     # A logarithm, hence no factor: whoever converts it has to know.
     "pCa": Unit("pCa", math.nan),
+    "V": Unit("stimulation", 1.0),
+    "mV": Unit("stimulation", 1e-3),
+    "1": Unit("stimulation", 1.0),
 }
 KINDS = {
     "time": ("time",),
     "length": ("length", "relative length"),
     "force": ("force", "stress", "relative force"),
     "calcium": ("calcium", "pCa"),
+    "stimulation": ("stimulation",),
 }
 
 
 def unit_of(text: str, column: str, where: str) -> Unit:
-    """The unit named ``text`` for a column of ``time``, ``length``, ``force`` or ``calcium``.
+    """The unit named ``text`` for a column of ``time``, ``length``, ``force``, ``calcium`` or ``stimulation``.
 
     Raises:
         UserError: unknown unit, or one of something else.
@@ -75,18 +79,21 @@ def unit_of(text: str, column: str, where: str) -> Unit:
     return UNITS[name]
 
 
-def quantity(text: str, column: str, what: str, where: str) -> Quantity:
-    """A quantity such as ``42.8 mm``, above zero, in a unit that fits the column.
+def quantity(text: str, column: str, what: str, where: str, example: str = "42.8 mm", zero: bool = False) -> Quantity:
+    """A quantity such as ``42.8 mm``, above zero (or zero too), in a unit that fits the column.
 
     Raises:
-        UserError: no number above zero with a fitting unit.
+        UserError: no such number with a fitting unit; the message shows the example.
     """
     match = re.fullmatch(r"\s*(\S+)\s+(\S+)\s*", text)
     try:
         value = float(match.group(1)) if match else math.nan
     except ValueError:
         value = math.nan
-    if match is None or not (math.isfinite(value) and value > 0.0):
-        raise UserError(f"{where}: {what} is '{text}'; needed is a number above 0 and its unit, for example '42.8 mm'")
+    if match is None or not (math.isfinite(value) and (value > 0.0 or (zero and value == 0.0))):
+        least = "from" if zero else "above"
+        raise UserError(
+            f"{where}: {what} is '{text}'; needed is a number {least} 0 and its unit, for example '{example}'"
+        )
     unit = unit_of(match.group(2), column, f"{where}: {what}")
     return Quantity(value * unit.factor, unit.kind)

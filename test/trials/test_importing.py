@@ -1,0 +1,210 @@
+"""Importing one trial after another: what is kept, refused, left out, and what an interruption leaves."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from xb_muscle_ros.trials import importing
+from xb_muscle_ros.trials.bag_files import clear_leftovers
+from xb_muscle_ros.trials.bags import find_bags, read_trial, write_trial
+from xb_muscle_ros.trials.importing import Failed, FileDone, Imported, Kept, bag_name, import_recordings
+from xb_muscle_ros.trials.provenance import recorded_provenance
+from xb_muscle_ros.trials.readers.settings import ImportSettings
+from xb_muscle_ros.trials.trial import Trial
+
+TREE: dict[str, Any] = {
+    "fibre": "f1",
+    "pca": 6.1,
+    "columns": {
+        "time": {"column": "t", "unit": "s"},
+        "length": {"column": "l", "unit": "L0"},
+        "force": {"column": "f", "unit": "F0"},
+    },
+}
+
+
+def _file(path: Path, force: str = "0.4") -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("t,l,f\n" + "\n".join(f"{i / 1000},1.0,{force}" for i in range(20)))
+    return path
+
+
+def _run(files: list[Path], out: Path, overwrite: bool = False, **keys: Any) -> list[importing.Event]:
+    return list(import_recordings(files, ImportSettings({**TREE, **keys}, "here"), out, overwrite))
+
+
+def _kinds(events: list[importing.Event]) -> list[str]:
+    return [type(event).__name__ for event in events if not isinstance(event, FileDone)]
+
+
+def test_one_trial_is_written_before_the_next_is_read(tmp_path: Path) -> None:
+    files = [_file(tmp_path / "a.csv"), tmp_path / "b.csv"]  # the second comes into being later
+    events: Iterator[importing.Event] = import_recordings(files, ImportSettings(TREE, "here"), tmp_path / "bags")
+    first = next(events)
+    assert isinstance(first, Imported)
+    assert read_trial(first.bag).facts == first.trial.facts
+    assert isinstance(next(events), FileDone)
+    _file(files[1])
+    assert isinstance(next(events), Imported)
+
+
+def test_the_same_again_is_kept_wherever_the_file_lies(tmp_path: Path) -> None:
+    _run([_file(tmp_path / "a.csv")], tmp_path / "bags")
+    moved = tmp_path / "elsewhere" / "a.csv"
+    moved.parent.mkdir()
+    shutil.copy(tmp_path / "a.csv", moved)
+    (event, _) = _run([moved], tmp_path / "bags")
+    assert event == Kept(tmp_path / "bags" / "f1_a")
+
+
+@pytest.mark.parametrize(
+    ("force", "keys", "words"),
+    [
+        ("0.5", {}, "exists, made of another content of a.csv; use --overwrite"),
+        ("0.4", {"pca": 9.0}, "exists, made of the same file with another mapping; use --overwrite"),
+    ],
+)
+def test_what_has_changed_is_refused_unless_told_otherwise(
+    tmp_path: Path, force: str, keys: dict[str, Any], words: str
+) -> None:
+    _run([_file(tmp_path / "a.csv")], tmp_path / "bags")
+    before = read_trial(tmp_path / "bags" / "f1_a")
+    file = _file(tmp_path / "a.csv", force)
+    (event, _) = _run([file], tmp_path / "bags", **keys)
+    assert isinstance(event, Failed)
+    assert words in event.why
+    assert read_trial(tmp_path / "bags" / "f1_a").force_n.tolist() == before.force_n.tolist()
+    assert _kinds(_run([file], tmp_path / "bags", overwrite=True, **keys)) == ["Imported"]
+    assert _kinds(_run([file], tmp_path / "bags", **keys)) == ["Kept"]
+
+
+def test_a_bag_that_was_not_imported_is_never_taken_for_one(tmp_path: Path, trial: Trial) -> None:
+    write_trial(tmp_path / "bags" / "f1_a", trial)
+    (event, _) = _run([_file(tmp_path / "a.csv")], tmp_path / "bags")
+    assert isinstance(event, Failed)
+    assert "f1_a exists; use --overwrite" in event.why
+
+
+@pytest.mark.parametrize("damage", ["cut", "gone", "metadata"])
+def test_a_bag_that_is_not_whole_is_not_kept(tmp_path: Path, damage: str) -> None:
+    file = _file(tmp_path / "a.csv")
+    _run([file], tmp_path / "bags")
+    bag = tmp_path / "bags" / "f1_a"
+    data = bag / "f1_a_0.mcap"
+    if damage == "cut":
+        data.write_bytes(data.read_bytes()[:-20])
+    elif damage == "gone":
+        data.unlink()
+    else:
+        (bag / "metadata.yaml").write_text("a: [")
+    assert recorded_provenance(bag) is None
+    assert _kinds(_run([file], tmp_path / "bags")) == ["Failed"]
+    assert _kinds(_run([file], tmp_path / "bags", overwrite=True)) == ["Imported"]
+
+
+def test_after_an_interruption_the_next_run_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = [_file(tmp_path / f"{name}.csv") for name in "abc"]
+    write, written = importing.write_trial, []
+
+    def stopped(bag: Path, trial: Trial, **more: Any) -> None:
+        if len(written) == 1:
+            raise KeyboardInterrupt
+        written.append(bag)
+        write(bag, trial, **more)
+
+    monkeypatch.setattr(importing, "write_trial", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        _run(files, tmp_path / "bags")
+    assert [path.name for path in (tmp_path / "bags").iterdir()] == ["f1_a"]
+    monkeypatch.setattr(importing, "write_trial", write)
+    assert _kinds(_run(files, tmp_path / "bags")) == ["Kept", "Imported", "Imported"]
+
+
+def test_a_bag_that_is_interrupted_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from xb_muscle_ros.trials import bag_writing
+
+    def stopped(*_: Any, **__: Any) -> bytes:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(bag_writing.ros_types, "joint_state", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        _run([_file(tmp_path / "a.csv")], tmp_path / "bags")
+    assert list((tmp_path / "bags").iterdir()) == []
+
+
+def test_leftovers_of_a_killed_run_are_cleared(tmp_path: Path, trial: Trial) -> None:
+    gone = 2**22 + 1  # beyond the largest process number
+    for name in ("a", "b"):
+        write_trial(tmp_path / name, trial)
+    (tmp_path / "a").rename(
+        tmp_path / f".a.{gone}.old"
+    )  # killed between taking the old bag away and the new one's place
+    shutil.copytree(tmp_path / "b", tmp_path / f".b.{gone}.old")
+    shutil.copytree(tmp_path / "b", tmp_path / f".c.{gone}.tmp")
+    shutil.copytree(tmp_path / "b", tmp_path / f".d.{os.getpid()}.tmp")  # of a run that goes on
+    (tmp_path / ".e.1.tmp.txt").write_text("not ours")
+    clear_leftovers(tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == [f".d.{os.getpid()}.tmp", ".e.1.tmp.txt", "a", "b"]
+    assert read_trial(tmp_path / "a").facts == trial.facts
+
+
+def test_trials_of_one_file_are_kept_and_left_out_one_by_one(tmp_path: Path) -> None:
+    time_s = (np.arange(200) - 100) / 1000
+    shape = (200, 3, 1, 1)
+    data = {
+        "texp": np.broadcast_to(time_s[:, None, None, None], shape),
+        "Lexp": np.broadcast_to(np.interp(time_s, [0.005, 0.0893], [0, 0.0383])[:, None, None, None], shape),
+        "Fexp": np.ones(shape),
+        "pCas": [4.5, 6.1, 6.1],  # one twice
+        "ISIs": [1.0],
+        "AMPs": [0.0],
+    }
+    savemat(tmp_path / "f1.mat", {"data": data})
+    settings = ImportSettings({}, "here")
+    events = list(import_recordings([tmp_path / "f1.mat"], settings, tmp_path / "bags"))
+    assert _kinds(events) == ["Imported", "Imported", "Failed"]
+    assert isinstance(events[2], Failed)
+    assert "trial f1_amp0_rt1ms_pca61, and" in events[2].why
+    shutil.rmtree(tmp_path / "bags" / "f1_amp0_rt1ms_pca45")
+    again = list(import_recordings([tmp_path / "f1.mat"], settings, tmp_path / "bags"))
+    assert _kinds(again) == ["Imported", "Kept", "Failed"]
+    assert len(find_bags([tmp_path / "bags"])) == 2
+
+
+def test_broken_files_do_not_stop_the_others(tmp_path: Path) -> None:
+    (tmp_path / "b.csv").write_text("")
+    (tmp_path / "c.mat").write_bytes(b"MATLAB 5.0 MAT-file")
+    (tmp_path / "d.csv").mkdir()
+    files = [_file(tmp_path / "a.csv"), *(tmp_path / name for name in ("b.csv", "c.mat", "d.csv", "e.csv"))]
+    files.append(_file(tmp_path / "f.csv"))
+    events = _run(files, tmp_path / "bags")
+    assert _kinds(events) == ["Imported", "Failed", "Failed", "Failed", "Failed", "Imported"]
+    for event, file in zip((e for e in events if isinstance(e, Failed)), files[1:5], strict=True):
+        assert str(file) in event.why
+        assert "\n" not in event.why
+
+
+def test_a_broken_file_does_not_keep_its_name_from_another(tmp_path: Path) -> None:
+    files = [_file(tmp_path / "a.csv", "nan"), _file(tmp_path / "x" / "a.csv")]
+    assert _kinds(_run(files, tmp_path / "bags")) == ["Failed", "Imported"]
+
+
+@pytest.mark.parametrize(
+    ("data_set", "trial", "name"),
+    [
+        ("cat", "ramp 1", "cat_ramp_1"),
+        ("cat", "cat_1", "cat_1"),
+        ("c/a..t", "é", "c_a..t__"),
+        ("..", "x", "_x"),
+    ],
+)
+def test_bag_names_are_plain(data_set: str, trial: str, name: str) -> None:
+    assert bag_name(data_set, trial) == name

@@ -1,0 +1,172 @@
+"""Recordings become bags, one trial at a time; what a run did not finish, the next one goes on with."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.bag_files import clear_leftovers
+from xb_muscle_ros.trials.bags import write_trial
+from xb_muscle_ros.trials.provenance import Provenance, provenance_of, recorded_provenance
+from xb_muscle_ros.trials.readers.assembly import trial_of
+from xb_muscle_ros.trials.readers.base import Pending
+from xb_muscle_ros.trials.readers.registry import READERS, recording_suffixes
+from xb_muscle_ros.trials.readers.settings import ImportSettings, MappingError, Prepared
+from xb_muscle_ros.trials.trial import Trial
+
+
+class Imported(NamedTuple):
+    """A bag was written."""
+
+    bag: Path
+    trial: Trial
+
+
+class Kept(NamedTuple):
+    """A bag of the same file and the same mapping is there already."""
+
+    bag: Path
+
+
+class Failed(NamedTuple):
+    """A file, or a trial in it, was not imported; why, on one line."""
+
+    why: str
+
+
+class FileDone(NamedTuple):
+    """All there is to do with a file is done."""
+
+    path: Path
+
+
+Event = Imported | Kept | Failed | FileDone
+
+
+def find_recordings(paths: Iterable[Path], out: Path | None = None) -> list[Path]:
+    """Files and bag folders to import: those given, and in folders, at any depth, those that are called like one.
+
+    Args:
+        paths: as the user gave them.
+        out: folder of the bags that are made; what is in it is no recording.
+
+    Raises:
+        UserError: a folder holds none.
+    """
+    found: list[Path] = []
+    for path in paths:
+        if not path.is_dir() or READERS["bag"].matches(path):
+            found.append(path)
+            continue
+        inside = list(_recordings_in(path, None if out is None else out.resolve()))
+        if not inside:
+            raise UserError(f"{path} holds no recording; looked for: bags, {', '.join(recording_suffixes())}")
+        found += inside
+    return found
+
+
+def import_recordings(
+    paths: Iterable[Path], settings: ImportSettings, out: Path, overwrite: bool = False
+) -> Iterator[Event]:
+    """Import files one by one. Of the files that are done, nothing is kept but names.
+
+    Args:
+        paths: files and bag folders.
+        settings: mapping and options.
+        out: folder of the bags; made if need be.
+        overwrite: replace bags that exist and were made of something else.
+
+    Raises:
+        MappingError: the mapping is wrong.
+    """
+    if out.is_dir():
+        clear_leftovers(out)
+    run = _Run(settings, out, overwrite, {})
+    for path in paths:
+        yield from _import_file(path, run)
+        yield FileDone(path)
+
+
+def bag_name(data_set: str, trial: str) -> str:
+    """Name of a trial's bag: data set and trial, in characters every file system and shell takes."""
+    name = trial if trial.startswith(data_set) else f"{data_set}_{trial}"
+    return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).lstrip(".-")
+
+
+class _Run(NamedTuple):
+    """What holds for all files, and the file of each bag that is done, by their names."""
+
+    settings: ImportSettings
+    out: Path
+    overwrite: bool
+    done: dict[str, str]
+
+
+def _import_file(path: Path, run: _Run) -> Iterator[Event]:
+    try:
+        prepared = run.settings.prepare(path)
+        origin = provenance_of(path, prepared.digest)
+        any_trial = False
+        for pending in prepared.reader.trials(path, prepared.mapping):
+            any_trial = True
+            yield _import_trial(pending, prepared, origin, run)
+        if not any_trial:
+            yield Failed(f"{path} holds no measured trial; give another file")
+    except MappingError:
+        raise
+    except UserError as problem:
+        yield Failed(str(problem))
+    except OSError as problem:
+        yield Failed(f"{path} cannot be read: {problem.strerror or problem}; look at its permissions")
+
+
+def _import_trial(pending: Pending, prepared: Prepared, origin: Provenance, run: _Run) -> Event:
+    bag = run.out / bag_name(prepared.mapping.data_set_of(prepared.path), pending.trial)
+    here = f"{prepared.path}, trial {pending.trial}"
+    if bag.name in run.done:
+        other = run.done[bag.name]
+        return Failed(f"{here}, and {other} would both become {bag}; import one of them into another folder")
+    if bag.exists():
+        recorded = recorded_provenance(bag)
+        if recorded == origin:
+            run.done[bag.name] = str(prepared.path)
+            return Kept(bag)
+        if not run.overwrite:
+            return Failed(
+                f"bag {bag} exists{_other(recorded, origin)}; use --overwrite to replace it or --out for another folder"
+            )
+    try:
+        trial = trial_of(pending.read(), prepared.mapping, prepared.path, run.settings.isometric_scaling)
+        write_trial(bag, trial, more=origin.custom_data())
+    except UserError as problem:
+        return Failed(str(problem))
+    run.done[bag.name] = str(prepared.path)
+    return Imported(bag, trial)
+
+
+def _other(recorded: Provenance | None, origin: Provenance) -> str:
+    """What a bag was made of that is not what it would be made of now."""
+    if recorded is None:
+        return ""
+    if recorded.source == origin.source:
+        return ", made of the same file with another mapping"
+    name = recorded.source.rpartition(" ")[0]
+    same = name == origin.source.rpartition(" ")[0]
+    return f", made of {'another content of ' if same else ''}{name}"
+
+
+def _recordings_in(folder: Path, out: Path | None) -> Iterator[Path]:
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith(".") or path.resolve() == out:
+            continue
+        if path.is_dir():
+            if READERS["bag"].matches(path):
+                if folder.resolve() != out:
+                    yield path
+            else:
+                yield from _recordings_in(path, out)
+        elif path.suffix.lower() in recording_suffixes():
+            yield path

@@ -1,0 +1,163 @@
+"""What has to be known of a data set's files to make trials of them; `mapping` makes it of a mapping file."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.activation import CalciumTransient
+from xb_muscle_ros.trials.readers.units import Quantity, Unit
+
+FACTS = ("pca", "amplitude_l0", "recovery_s")
+
+
+class Column(NamedTuple):
+    """Where the numbers of a signal are, a column, a channel or a field of a topic's messages, and their unit."""
+
+    name: str
+    unit_name: str
+    unit: Unit
+    field: str = ""
+
+
+class Stimulation(NamedTuple):
+    """A record of stimulation: on above ``threshold`` (V or 1); gaps up to ``pulse_gap_s`` belong to one tetanus."""
+
+    column: Column
+    threshold: float
+    pulse_gap_s: float
+
+
+class Activation(NamedTuple):
+    """How stimulation becomes calcium, and when there is any where no column tells.
+
+    Attributes:
+        transient: levels and time constants.
+        source: where these come from, in words.
+        begin_s: begin of stimulation, s; None where a column tells, infinity where there is none.
+        end_s: its end, s; None for the sharp drop of force.
+    """
+
+    transient: CalciumTransient
+    source: str = ""
+    begin_s: float | None = None
+    end_s: float | None = None
+
+
+@dataclass(frozen=True)
+class ImportMapping:
+    """Everything that has to be known to make trials of one or more files.
+
+    Attributes:
+        where: the mapping file or the command line, for messages.
+        fibre: name of the fibre; ``{file}`` and ``{folder}`` stand for the names of the file and its folder.
+        data_set: begins the names of the bags; the fibre's name where it is not given; ``{folder}`` as in ``fibre``.
+        source: where the data come from, in words.
+        time, length: columns every file has.
+        force, calcium: columns a file may have.
+        stimulation: a column of stimulation a file may have.
+        activation: makes calcium of stimulation.
+        trial: name of the trial, with ``{file}`` and ``{folder}`` as in ``fibre``.
+        length_is_change: the length column holds the change from the reference length.
+        half_sarcomere: the length column is that of a half-sarcomere, so lengths are stored relative to L0 = 1 m.
+        reference_length: the length that is L0; None for the mean of the first isometric samples.
+        at_reference: what the length column reads where the fibre has its reference length; None for that length.
+        largest_step_s: samples may be this far apart, s; None for what a muscle's record usually has.
+        servo_give: length changes up to this that come back are none: the motor gave under the muscle's force.
+        f0: the force or stress that is F0.
+        f0_at_pca: F0 is the initial isometric force of the trial at this pCa in the same folder; None where not.
+        f0_note: where F0 comes from, where that was found out rather than given.
+        force_zero_from_slack: force is zero while the fibre is slack after a release.
+        pca, amplitude_l0, recovery_s: facts that hold for every file (-log10 M, L0, s).
+        file_name: finds facts in file names by its groups ``pca``, ``amplitude_l0``, ``recovery_s``.
+        factors: what a number found in the file name is multiplied with.
+        isometric_fractions: isometric force of the matching isometric trials by pCa, F0; may be empty.
+        isometric_source: where these come from.
+    """
+
+    where: str
+    fibre: str
+    data_set: str
+    source: str
+    time: Column
+    length: Column
+    force: Column | None = None
+    calcium: Column | None = None
+    stimulation: Stimulation | None = None
+    activation: Activation | None = None
+    trial: str = "{file}"
+    length_is_change: bool = False
+    half_sarcomere: bool = False
+    reference_length: Quantity | None = None
+    at_reference: float | None = None
+    largest_step_s: float | None = None
+    servo_give: Quantity | None = None
+    f0: Quantity | None = None
+    f0_at_pca: float | None = None
+    f0_note: str = ""
+    force_zero_from_slack: bool = False
+    pca: float | None = None
+    amplitude_l0: float | None = None
+    recovery_s: float | None = None
+    file_name: re.Pattern[str] | None = None
+    factors: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    isometric_fractions: Mapping[float, float] = field(default_factory=lambda: MappingProxyType({}))
+    isometric_source: str = ""
+
+    def facts_of(self, path: Path) -> dict[str, float | None]:
+        """pCa, amplitude (L0) and recovery (s) of one file; what its name tells goes before what holds for all.
+
+        Raises:
+            UserError: the file name does not match the pattern.
+        """
+        facts: dict[str, float | None] = {name: getattr(self, name) for name in FACTS}
+        if self.file_name is not None:
+            match = self.file_name.search(path.stem)
+            if match is None:
+                raise UserError(
+                    f"{path}: the file name does not match '{self.file_name.pattern}' of {self.where}; "
+                    "use the mapping made for this file"
+                )
+            for name, text in match.groupdict().items():
+                if text is not None:
+                    # 12 digits, so that 61 tenths are 6.1
+                    facts[name] = float(f"{finite(text, name, str(path)) * self.factors.get(name, 1.0):.12g}")
+        return facts
+
+    def fibre_of(self, path: Path) -> str:
+        """Name of the fibre a file is of."""
+        return filled(self.fibre, path)
+
+    def data_set_of(self, path: Path) -> str:
+        """Name of the data set a file belongs to."""
+        return filled(self.data_set, path)
+
+    def trial_of(self, path: Path) -> str:
+        """Name of the trial in a file; the begin of the names where it holds several."""
+        return filled(self.trial, path)
+
+
+def filled(template: str, path: Path) -> str:
+    """A name with ``{file}`` (without ending) and ``{folder}`` put in."""
+    return template.replace("{file}", path.stem).replace("{folder}", path.resolve().parent.name)
+
+
+def finite(value: object, key: str, where: str) -> float:
+    """A number.
+
+    Raises:
+        UserError: it is none, or not finite.
+    """
+    try:
+        number = float(value)  # type: ignore[arg-type]  # whatever it cannot take is told below
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise UserError(f"{where}: {key} is {value!r}; needed is a finite number")
+    return number

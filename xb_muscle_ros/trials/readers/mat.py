@@ -1,0 +1,185 @@
+"""Trials from MATLAB files of the data of Horslen et al. 2023, as van der Zee et al. 2026 arranged them.
+
+A struct ``data`` holds ``Fexp`` (F0), ``Lexp`` (change of length, L0) and ``texp`` (s) as samples x pCa x recovery x
+amplitude, padded with NaN, and ``pCas``, ``ISIs`` (recovery, ms) and ``AMPs`` (1e-4 L0). The test stretch begins at
+0.005 s, times before it are negative. A cell whose lengths or forces are all NaN was not measured.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.readers.base import Pending
+from xb_muscle_ros.trials.readers.columns import FILE
+from xb_muscle_ros.trials.readers.description import Column, ImportMapping
+from xb_muscle_ros.trials.readers.recording import Recording, Signal
+from xb_muscle_ros.trials.trial import Array
+
+TEST_START_S = 0.005
+_STRUCT = "data"
+# Axes of the signals after that of samples: field of the struct, fact it tells, and factor to the fact's unit.
+_AXES = (("pCas", "pca", 1.0), ("ISIs", "recovery_s", 1e-3), ("AMPs", "amplitude_l0", 1e-4))
+_MAGIC = (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file")
+Cell = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class _Data:
+    """The struct: signals of shape (samples, pCa, recovery, amplitude) by field, and the axes as in the file."""
+
+    path: Path
+    signals: dict[str, Array]
+    axes: tuple[Array, ...]
+
+    def values(self, column: Column, cell: Cell) -> Array:
+        """Samples of a cell without the padding."""
+        samples: Array = self.signals[column.name][:, cell[0], cell[1], cell[2]]
+        finite = np.flatnonzero(np.isfinite(samples))
+        return samples[: finite[-1] + 1] if finite.size else samples[:0]
+
+
+class MatReader:
+    """Many trials to a file, which is one fibre."""
+
+    name = "mat"
+    suffixes: tuple[str, ...] = (".mat",)
+    kind = FILE
+    defaults: Mapping[str, Any] = {
+        "fibre": "{file}",
+        "columns": {
+            "time": {"column": "texp", "unit": "s"},
+            "length": {"column": "Lexp", "unit": "L0", "is": "change"},
+            "force": {"column": "Fexp", "unit": "F0"},
+        },
+    }
+
+    def matches(self, path: Path) -> bool:
+        """Whether the file begins or is called like one of MATLAB."""
+        if path.suffix.lower() in self.suffixes:
+            return True
+        if not path.is_file():
+            return False
+        with path.open("rb") as file:
+            return file.read(len(_MAGIC[0])) in _MAGIC
+
+    def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
+        """The measured cells of the file, pCa by pCa; the file is read whole, its trials are made one at a time.
+
+        Raises:
+            UserError: no such file, or one without the struct or with arrays that do not fit each other.
+        """
+        data = _load(path, mapping)
+        measured = [column for column in (mapping.length, mapping.force) if column is not None]
+        for cell in itertools.product(*(range(axis.size) for axis in data.axes)):
+            if all(data.values(column, cell).size for column in measured):
+                pca, recovery_ms, amplitude = (axis[i] for axis, i in zip(data.axes, cell, strict=True))
+                name = f"{mapping.trial_of(path)}_amp{amplitude:g}_rt{recovery_ms:g}ms_pca{10.0 * pca:.6g}"
+                yield Pending(name, partial(_recording, data, mapping, cell, name))
+
+    def pca(self, path: Path, mapping: ImportMapping) -> None:
+        """None: a file holds several."""
+
+
+def _recording(data: _Data, mapping: ImportMapping, cell: Cell, name: str) -> Recording:
+    where = f"{data.path}, trial {name}"
+    facts = _facts(data, cell, where)
+    time, length = data.values(mapping.time, cell), data.values(mapping.length, cell)
+    force = None if mapping.force is None else data.values(mapping.force, cell)
+    if mapping.force is not None and force is not None and force.size != length.size:
+        raise UserError(
+            f"{where}: {mapping.length.name} has {length.size} samples, {mapping.force.name} {force.size}; needed are "
+            "equal numbers; mend the file"
+        )
+    warnings: tuple[str, ...] = ()
+    if 0 < time.size < length.size:
+        # The authors kept one record of times for all pCa.
+        warnings = (f"{where}: {length.size} samples have {time.size} times; those without a time are left out",)
+    count = min(time.size, length.size)
+
+    def signal(column: Column, values: Array) -> Signal:
+        return Signal(column.name, values[:count], lambda i: f"sample {i + 1}")
+
+    shift = max(0.0, -float(time[0])) if count else 0.0
+    test_start_s = TEST_START_S + shift * mapping.time.unit.factor
+    return Recording(
+        where=where,
+        trial=name,
+        time=signal(mapping.time, time + shift),
+        length=signal(mapping.length, length),
+        force=None if mapping.force is None or force is None else signal(mapping.force, force),
+        facts=facts,
+        notes=(f"time {TEST_START_S:g} s of the file is {test_start_s:.6g} s here",),
+        warnings=warnings,
+        test_start_s=test_start_s,
+    )
+
+
+def _facts(data: _Data, cell: Cell, where: str) -> dict[str, float | None]:
+    facts: dict[str, float | None] = {}
+    for (field, fact, factor), axis, i in zip(_AXES, data.axes, cell, strict=True):
+        if not np.isfinite(axis[i]):
+            raise UserError(f"{where}: {field}({i + 1}) is {axis[i]}; needed is a number; mend the file")
+        facts[fact] = float(f"{factor * float(axis[i]):.12g}")  # 12 digits, so that 316 ms are 0.316 s
+    return facts
+
+
+def _load(path: Path, mapping: ImportMapping) -> _Data:
+    struct = _struct(path)
+    columns = [column for column in (mapping.time, mapping.length, mapping.force) if column is not None]
+    missing = [name for name in (*(c.name for c in columns), *(field for field, *_ in _AXES)) if name not in struct]
+    if missing:
+        raise UserError(
+            f"{path}: struct {_STRUCT} has no {missing[0]}; its fields: {', '.join(map(str, struct))}; is it a file of "
+            "this data set?"
+        )
+    axes = tuple(np.atleast_1d(_numbers(path, struct, field)).ravel() for field, *_ in _AXES)
+    shape = tuple(axis.size for axis in axes)
+    signals = {}
+    for column in columns:
+        array = np.atleast_1d(_numbers(path, struct, column.name))
+        cells = int(np.prod(shape))
+        # MATLAB drops axes of length 1 at the end, SciPy the others.
+        if (
+            array.size % cells
+            or array.size == 0
+            or tuple(n for n in array.shape[1:] if n > 1) != tuple(n for n in shape if n > 1)
+        ):
+            raise UserError(
+                f"{path}: {column.name} has shape {array.shape}; needed are samples x {shape}, as "
+                "pCas, ISIs and AMPs tell"
+            )
+        signals[column.name] = array.reshape(-1, *shape)
+    return _Data(path, signals, axes)
+
+
+def _struct(path: Path) -> dict[str, Any]:
+    from scipy.io import loadmat
+
+    try:
+        content = loadmat(path, variable_names=[_STRUCT], simplify_cells=True)
+    except FileNotFoundError as problem:
+        raise UserError(f"{path} cannot be read: {problem.strerror}; give a MATLAB file") from problem
+    except NotImplementedError:
+        raise UserError(f"{path} is a MATLAB 7.3 file; allowed are earlier versions; use save(..., '-v7')") from None
+    except Exception as problem:  # SciPy passes on whatever its parser trips over
+        raise UserError(f"{path} is no whole MATLAB file ({problem}); copy it again") from problem
+    struct = content.get(_STRUCT)
+    if not isinstance(struct, dict):
+        raise UserError(f"{path} has no struct '{_STRUCT}'; is it a file of this data set?")
+    return struct
+
+
+def _numbers(path: Path, struct: dict[str, Any], field: str) -> Array:
+    try:
+        array: Array = np.asarray(struct[field], dtype=np.float64)
+    except (TypeError, ValueError):
+        raise UserError(f"{path}: {_STRUCT}.{field} holds no numbers; is it a file of this data set?") from None
+    return array

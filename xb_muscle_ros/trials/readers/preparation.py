@@ -1,0 +1,61 @@
+"""F0 of a preparation: the isometric force of its trial at full activation, in the same folder."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.readers.assembly import trial_of
+from xb_muscle_ros.trials.readers.base import Reader
+from xb_muscle_ros.trials.readers.description import ImportMapping
+from xb_muscle_ros.trials.readers.force import Force, isometric_force
+from xb_muscle_ros.trials.readers.units import Quantity
+
+_SAME_PCA = 1e-6
+
+
+class FoundF0(NamedTuple):
+    """F0, and where it comes from, in words."""
+
+    f0: Quantity
+    note: str
+
+
+def isometric_f0(folder: Path, suffix: str, reader: Reader, mapping: ImportMapping, pca: float) -> FoundF0 | None:
+    """F0 of the preparation whose files a folder holds; None where no file tells it.
+
+    Args:
+        folder: of the preparation.
+        suffix: ending of its files.
+        reader: reads them.
+        mapping: of them; its F0 is not used.
+        pca: of the trial looked for. Where several have it, the largest force counts: a fibre runs down.
+    """
+    assert mapping.force is not None  # the mapping was checked
+    told = replace(mapping, f0=None, f0_at_pca=None)
+    best: tuple[float, str] | None = None
+    for file in sorted(folder.iterdir()):
+        if file.suffix.lower() != suffix or not file.is_file():
+            continue
+        force = _force(file, reader, told, pca)
+        if force is not None and (best is None or force > best[0]):
+            best = (force, file.name)
+    if best is None or best[0] <= 0.0:
+        return None
+    note = f", the initial isometric force at pCa {pca:g} in {best[1]}"
+    return FoundF0(Quantity(best[0], mapping.force.unit.kind), note)
+
+
+def _force(file: Path, reader: Reader, mapping: ImportMapping, pca: float) -> float | None:
+    """Initial isometric force of a file's trial; None where it has another pCa or cannot be read."""
+    try:
+        found = reader.pca(file, mapping)
+        if found is None or abs(found - pca) > _SAME_PCA:
+            return None
+        pending = next(reader.trials(file, mapping))
+        trial = trial_of(pending.read(), mapping, file, isometric_scaling=False)
+    except UserError:  # a broken neighbour is told when its turn comes
+        return None
+    return isometric_force(Force(trial.force_time_s, trial.force_n), trial.facts.phases)
