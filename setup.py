@@ -47,8 +47,9 @@ setup(
     ],
     extras_require={
         "mujoco": ["mujoco>=3.1"],
-        "dask": ["dask>=2024.1", "distributed>=2024.1"],
+        "dask": ["cloudpickle>=2.0", "dask>=2024.1", "distributed>=2024.1"],
         "test": [
+            "distributed",
             "pytest",
             "hypothesis",
             "ruff",
