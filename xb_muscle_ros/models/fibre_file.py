@@ -14,7 +14,7 @@ from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked, complete
 from xb_muscle_ros.models.registry import BASE_OF, METHODS, compose, model_of_set, split_set
 
-_TOP = ("fibre", "model", "method", "source", "constants", "models")
+_TOP = ("fibre", "model", "method", "source", "sources", "constants", "models")
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Fibre:
         values: every parameter of the set's model, defaults filled in, in the table's units.
         reference_length_m: length at rest, one L0.
         f0_n: isometric force at pCa 4.5, one F0.
-        source: where the values come from.
+        source: where the set's values come from: what the file says of this set under ``sources``, else of all.
         path: the file, or None where the values came as parameters.
         available_models: sets that the file holds; their variants are available as well.
     """
@@ -153,6 +153,7 @@ def fibre_from_parameters(
     sets: dict[str, dict[str, float]] = {}
     constants = {name: row.default for name, row in CONSTANTS.items()}
     text: dict[str, str] = {}
+    sources: dict[str, str] = {}
     for name, value in parameters.items():
         head, _, rest = name.partition(".")
         if head == "models" and "." in rest:
@@ -161,6 +162,9 @@ def fibre_from_parameters(
             sets.setdefault(set_name, {})[parameter] = checked(
                 parameter, value, PARAMETERS, f"{where}, model {set_name}"
             )
+        elif head == "sources" and rest:
+            model_of_set(rest, where)
+            sources[rest] = str(value)
         elif head == "constants" and rest:
             constants[rest] = checked(rest, value, CONSTANTS, where)
         elif name in _TOP[:4]:
@@ -188,10 +192,20 @@ def fibre_from_parameters(
         values=MappingProxyType(values),
         reference_length_m=float(constants["reference_length_m"] or 0.0),
         f0_n=float(constants["f0_n"] or 0.0),
-        source=text.get("source", ""),
+        source=sources.get(chosen) or sources.get(base_set(chosen)) or text.get("source", ""),
         path=None,
         available_models=tuple(sets),
     )
+
+
+def base_set(name: str, where: str = "") -> str:
+    """Set that a variant's set starts from: ``3state_coop_v3`` of ``3state_coop_rigid_v3``; itself where it is none.
+
+    Raises:
+        UserError: no such model.
+    """
+    model, version = split_set(name, where)
+    return BASE_OF[model] + version
 
 
 def _own_and_base(chosen: str, sets: Mapping[str, dict[str, float]], where: str) -> dict[str, float]:
@@ -200,13 +214,13 @@ def _own_and_base(chosen: str, sets: Mapping[str, dict[str, float]], where: str)
     Raises:
         UserError: neither has a set here.
     """
-    model, version = split_set(chosen, where)
-    base = BASE_OF[model] + version
+    base = base_set(chosen, where)
     if chosen in sets and base == chosen:
         return sets[chosen]
     if chosen not in sets and base not in sets:
         nor = "" if base == chosen else f", nor has '{base}'"
         raise UserError(f"{where}: model '{chosen}' has no parameter set here{nor}; there are {', '.join(sets)}")
+    model = model_of_set(chosen, where)
     replaced = set(compose(BASE_OF[model]).parameters) - set(compose(model).parameters)
     no_use = {row.name for row in replaced}
     inherited = {name: value for name, value in sets.get(base, {}).items() if name not in no_use}

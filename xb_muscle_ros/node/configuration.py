@@ -51,6 +51,7 @@ def flat(fibre: Fibre) -> dict[str, object]:
         "model": fibre.model,
         "method": fibre.method,
         "source": fibre.source,
+        f"sources.{fibre.model}": fibre.source,
         "constants.reference_length_m": fibre.reference_length_m,
         "constants.f0_n": fibre.f0_n,
         **{f"models.{fibre.model}.{name}": value for name, value in fibre.values.items()},

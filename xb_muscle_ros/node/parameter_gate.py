@@ -26,6 +26,7 @@ from xb_muscle_ros.node.parameters import (
     fibre_descriptor,
     is_fibre_parameter,
     is_foreign,
+    is_text,
     node_descriptor,
     unknown,
 )
@@ -122,12 +123,12 @@ class ParameterGate:
 
     def _give(self, name: str, value: object) -> None:
         head, _, rest = name.partition(".")
-        if name not in TEXTS and not (head in ("constants", "models") and rest):
+        if not is_text(name) and not (head in ("constants", "models") and rest):
             self.error = self.error or unknown(name, ("constants", "models"))
             return
-        self._given[name] = str(value) if name in TEXTS else value
+        self._given[name] = str(value) if is_text(name) else value
         try:
-            value = str(value) if name in TEXTS else self._checked(name, value)
+            value = str(value) if is_text(name) else self._checked(name, value)
             self._declare(name, value)
         except UserError:
             # Configuring will say what is wrong with it, with the whole set at hand.
@@ -190,11 +191,11 @@ class ParameterGate:
     def _check_fibre(self, new: dict[str, object]) -> None:
         if self.fibre is None:
             for name, value in new.items():
-                if name not in TEXTS:
+                if not is_text(name):
                     self._checked(name, value)
             return
         for name, value in new.items():
-            if name in TEXTS and value != self._values[name]:
+            if is_text(name) and value != self._values[name]:
                 self._check_moment(name, UNCONFIGURED)
         if new:
             fibre = fibre_from_parameters({**self._values, **new}, WHERE)

@@ -63,6 +63,12 @@ TEXTS: Mapping[str, str] = MappingProxyType(
     }
 )
 
+
+def is_text(name: str) -> bool:
+    """Whether a parameter of the fibre is text and no number."""
+    return name in TEXTS or name.startswith("sources.")
+
+
 # Parameters that rclpy itself declares.
 _FOREIGN = ("use_sim_time", "start_type_description_service", "qos_overrides.")
 
@@ -128,8 +134,9 @@ def node_descriptor(name: str) -> ParameterDescriptor:
 
 def fibre_descriptor(name: str) -> ParameterDescriptor:
     """Descriptor of a parameter of the fibre, such as ``models.3state_coop.f``, from the table of all parameters."""
-    if name in TEXTS:
-        return ParameterDescriptor(description=f"{TEXTS[name]}; set {UNCONFIGURED}")
+    if is_text(name):
+        meaning = TEXTS.get(name, "where the values of the set come from")
+        return ParameterDescriptor(description=f"{meaning}; set {UNCONFIGURED}")
     head, _, rest = name.partition(".")
     table, key = (CONSTANTS, rest) if head == "constants" else (PARAMETERS, rest.rpartition(".")[2])
     when = "takes effect at the next reset" if head == "constants" else f"set {ALWAYS}"

@@ -79,7 +79,7 @@ def _check(link: Link, trials: Sequence[Trial], fibre: Fibre | None, command: st
         raise UserError(f"node {link.peer} is {state}; activate it: ros2 lifecycle set {link.peer} activate")
     wanted: dict[str, object] = {"mode": "lockstep"}
     if fibre is not None:
-        wanted |= {n: v for n, v in flat(fibre).items() if n != "source" and not n.startswith("constants.")}
+        wanted |= {n: v for n, v in flat(fibre).items() if not n.startswith(("source", "constants."))}
     found = link.parameters(["fibre", *wanted])
     for trial in trials:
         if trial.facts.fibre != found["fibre"]:
