@@ -23,6 +23,11 @@ def test_results_come_in_the_order_of_tasks(processes: int) -> None:
 
 
 @PLACES
+def test_a_task_may_run_tasks_of_its_own(processes: int) -> None:
+    assert run(work_tasks.nested, [[1.0, 2.0], [7.0]], Options(processes=processes)) == [[1 / 3, 2 / 3], [7 / 3]]
+
+
+@PLACES
 def test_no_tasks(processes: int) -> None:
     assert run(work_tasks.complain_at_three, [], Options(processes=processes)) == []
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.errors import StateViolation, UserError
+from xb_muscle_ros.work import Options, run
 
 
 def awkward_floats(seed: int) -> dict[str, Any]:
@@ -99,3 +100,13 @@ def simulate(task: dict[str, Any]) -> list[float]:
 def long_text(i: int) -> str:
     """100 kB."""
     return f"{i}".ljust(100_000, ".")
+
+
+def nested(numbers: list[float]) -> list[float]:
+    """A task that has tasks of its own."""
+    return run(third, numbers, Options(processes=0, quiet=True))
+
+
+def third(number: float) -> float:
+    """A third."""
+    return number / 3.0

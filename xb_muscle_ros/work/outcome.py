@@ -11,8 +11,9 @@ from typing import Literal, NamedTuple
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.work.identity import describe
 
-# Compiled loops over many fibres may not be entered by two threads at once, and a Dask worker may have several.
-_ONE_AT_A_TIME = threading.Lock()
+# Compiled loops over many fibres may not be entered by two threads at once, and a Dask worker may have several. A task
+# may well run tasks of its own where it is.
+_ONE_AT_A_TIME = threading.RLock()
 
 
 class TaskFailed(Exception):
