@@ -1,0 +1,220 @@
+"""``xb_muscle fit``: the parameters of a fibre from its recordings, and how well they are known."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xb_muscle_ros.cli.common import add_fibre, add_work, fibre_of, warn, work_options_of
+from xb_muscle_ros.errors import UserError
+
+if TYPE_CHECKING:
+    from xb_muscle_ros.fit.coordinates import Choice
+    from xb_muscle_ros.fit.problem import Problem
+    from xb_muscle_ros.trials.trial import Trial
+
+    Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
+
+_EPILOG = """RULE is KEY=VALUE with KEY one of trial (VALUE may have * and ?), pca, amplitude (L0), recovery (s): a
+trial meets it within what such conditions vary by. Faults of the measurement are pca_shift (per solution), length_gain,
+run_down, time_shift, transducer_lag (per study), force_offset and force_drift (per trial)."""
+
+
+def add(subparsers: Subparsers) -> None:
+    """Add the command to the command line."""
+    parser = subparsers.add_parser(
+        "fit",
+        help="estimate a fibre's parameters from recordings",
+        description="Fit a model to the measured force of trials; writes a fibre file, fit.json and figures.",
+        epilog=_EPILOG,
+    )
+    parser.add_argument("bags", nargs="*", metavar="BAG", help="bags or folders of bags, in the order of recording")
+    add_fibre(parser)
+    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="fibre file to write")
+    parser.add_argument("--hold-out", nargs="+", default=[], metavar="RULE", help="keep these trials out of the fit")
+    parser.add_argument("--train", nargs="+", default=[], metavar="RULE", help="fit to these trials only")
+    parser.add_argument("--split", choices=("paper",), help="the paper's two protocols are fitted, the others held out")
+    parser.add_argument(
+        "--window", choices=("paper", "whole"), default="paper", help="force that counts (default: paper)"
+    )
+    parser.add_argument("--weight", nargs="+", default=[], metavar="TRIAL=W", help="weights of trials (default: 1)")
+    parser.add_argument("--free", nargs="+", metavar="NAME", help="parameters to fit (default: those the paper fitted)")
+    parser.add_argument("--fix", nargs="+", default=[], metavar="NAME", help="parameters that keep their start value")
+    parser.add_argument("--tie", nargs="+", default=[], metavar="A=B", help="parameter A takes the value of B")
+    parser.add_argument("--bound", nargs="+", default=[], metavar="NAME=LO:HI", help="bounds of parameters")
+    parser.add_argument(
+        "--prior", nargs="+", default=[], metavar="NAME=MEAN:SD",
+        help="prior; of positive parameters log-normal with SD as a share; inf: none (default: a factor of e)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--nuisance", nargs="+", default=[], metavar="FAULT[=SD]",
+        help="faults of the measurement to fit beside the parameters; 'all' for all of them",
+    )  # fmt: skip
+    parser.add_argument(
+        "--prior-fibers",
+        nargs="+",
+        default=[],
+        metavar="FIBER",
+        help="priors from what these other fibres' sets are like",
+    )
+    parser.add_argument(
+        "--features", type=Path, metavar="JSON", help="measured SRS and isometric force to meet as well"
+    )
+    parser.add_argument("--features-of", metavar="FIBER", help="whose features (default: the fibre of the trials)")
+    parser.add_argument("--force-pca-only", action="store_true", help="of the features, isometric force alone")
+    parser.add_argument(
+        "--no-anchor", action="store_true", help="do not ask for an isometric force of 1 F0 (SD 0.02) at pCa 4.5"
+    )
+    parser.add_argument("--starts", type=int, default=4, help="descents from different points (default 4)")
+    parser.add_argument("--seed", type=int, default=1, help="of the random starts (default 1)")
+    parser.add_argument("--level", type=float, default=0.95, help="of the intervals (default 0.95)")
+    parser.add_argument(
+        "--no-intervals", action="store_true", help="leave the profiles out: the longest part of the work"
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace results that exist")
+    add_work(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fit, print the tables, write the files."""
+    from xb_muscle_ros.fit.report import as_json, table, write_fitted, write_json
+    from xb_muscle_ros.fit.run import Settings, fit
+
+    out = arguments.out
+    if out.suffix not in (".yaml", ".yml"):
+        raise UserError(f"--out is {out}; needed is the name of a fibre file, ending in .yaml")
+    if out.exists() and not arguments.overwrite:
+        raise UserError(f"{out} exists; use --overwrite to replace it or choose another name for --out")
+    if not 0.5 <= arguments.level < 1.0:
+        raise UserError(f"--level is {arguments.level:g}; allowed is 0.5 up to below 1")
+    trials = _trials(arguments)
+    problem = _problem(arguments, trials)
+    folder = out.with_suffix("")
+    fibre_of_trials = trials[0].facts.fibre if trials else arguments.features_of
+    settings = Settings(arguments.starts, arguments.seed, None if arguments.no_intervals else arguments.level)
+    fitted = fit(problem, settings, work_options_of(arguments, journal=folder / "journal.jsonl"))
+    provenance = {
+        "bags": [str(bag) for bag in arguments.bags],
+        "fibre_of_trials": fibre_of_trials,
+        "features": str(arguments.features) if arguments.features else None,
+        "start": str(arguments.fiber),
+        "split": {"hold_out": arguments.hold_out, "train": arguments.train, "preset": arguments.split},
+        "json": f"{folder.name}/fit.json",
+    }
+    found = as_json(fitted, provenance)
+    print(table(found))
+    for line in found["warnings"]:
+        warn(line)
+    write_json(folder / "fit.json", found)
+    for path in _figures(folder, fitted, found):
+        print(path)
+    write_fitted(out, fitted, found)
+    print(folder / "fit.json")
+    print(out)
+    return 0
+
+
+def _figures(folder: Path, fitted: Any, found: dict[str, Any]) -> list[Path]:
+    from xb_muscle_ros.figures.fit_figures import draw
+
+    return draw(folder, fitted, found)
+
+
+def _trials(arguments: argparse.Namespace) -> list[Trial]:
+    from xb_muscle_ros.trials.bags import find_bags, read_trial
+
+    if not arguments.bags and arguments.features is None:
+        raise UserError("nothing to fit to; give bags of trials, or --features")
+    if not arguments.bags and arguments.features_of is None:
+        raise UserError("without bags nobody knows whose features to fit; give --features-of")
+    trials = [read_trial(path) for path in find_bags(arguments.bags)] if arguments.bags else []
+    for trial in trials:
+        for warning in trial.warnings:
+            warn(warning)
+    fibres = dict.fromkeys(trial.facts.fibre for trial in trials)
+    if len(fibres) > 1:
+        raise UserError(f"trials are of fibres {', '.join(fibres)}; fit one fibre at a time")
+    return trials
+
+
+def _problem(arguments: argparse.Namespace, trials: list[Trial]) -> Problem:
+    from xb_muscle_ros.fit.coordinates import fault_coordinates, parameter_coordinates, population_choices
+    from xb_muscle_ros.fit.data import fit_trials
+    from xb_muscle_ros.fit.features import F0_ANCHOR, Feature, measured
+    from xb_muscle_ros.fit.problem import Problem
+    from xb_muscle_ros.fit.split import held_out
+    from xb_muscle_ros.models.fibre_file import load_fibre
+
+    fibre = fibre_of(arguments)
+    out = held_out([t.facts for t in trials], arguments.hold_out, arguments.train, arguments.split)
+    weights = {name: _number(value, f"--weight {name}") for name, value in _pairs(arguments.weight, "--weight")}
+    prepared = fit_trials(trials, out, arguments.window == "whole", weights)
+    training = [t for t in prepared if not t.held_out and t.weight > 0.0]
+    ties = dict(_pairs(arguments.tie, "--tie"))
+    names, sds = _nuisances(arguments.nuisance)
+    choices = _choices(arguments)
+    if arguments.prior_fibers:
+        others = [load_fibre(name, fibre.model) for name in arguments.prior_fibers]
+        choices = population_choices(others, choices)
+    coordinates = parameter_coordinates(fibre, arguments.free, arguments.fix, ties, choices)
+    coordinates += fault_coordinates(names, [t.name for t in training], [t.solution for t in training], sds)
+    features: tuple[Feature, ...] = () if arguments.no_anchor else (F0_ANCHOR,)
+    if arguments.features is not None:
+        whose = arguments.features_of or trials[0].facts.fibre
+        features += measured(arguments.features, whose, not arguments.force_pca_only)
+    return Problem(fibre, prepared, coordinates, ties, features)
+
+
+def _nuisances(given: list[str]) -> tuple[list[str], dict[str, float]]:
+    from xb_muscle_ros.measurement.faults import FAULTS
+
+    names: list[str] = []
+    sds = {}
+    for text in given:
+        name, equals, sd = text.partition("=")
+        names += list(FAULTS) if name == "all" else [name]
+        if equals:
+            sds[name] = _number(sd, f"--nuisance {name}")
+    return names, sds
+
+
+def _choices(arguments: argparse.Namespace) -> dict[str, Choice]:
+    from dataclasses import replace
+
+    from xb_muscle_ros.fit.coordinates import Choice
+
+    made: dict[str, Choice] = {}
+    for name, value in _pairs(arguments.bound, "--bound"):
+        low, high = _range(value, f"--bound {name}")
+        made[name] = replace(made.get(name, Choice()), lower=low, upper=high)
+    for name, value in _pairs(arguments.prior, "--prior"):
+        mean, sd = _range(value, f"--prior {name}")
+        made[name] = replace(made.get(name, Choice()), prior_mean=mean, prior_sd=sd)
+    return made
+
+
+def _pairs(given: list[str], option: str) -> list[tuple[str, str]]:
+    pairs = [text.partition("=") for text in given]
+    for text, (name, _, value) in zip(given, pairs, strict=True):
+        if not name or not value:
+            raise UserError(f"{option} {text}: needed is NAME=VALUE")
+    return [(name, value) for name, _, value in pairs]
+
+
+def _range(text: str, where: str) -> tuple[float, float]:
+    low, colon, high = text.partition(":")
+    if not colon:
+        raise UserError(f"{where}={text}: needed are two numbers with a colon between them")
+    return _number(low, where), _number(high, where)
+
+
+def _number(text: str, where: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise UserError(f"{where}: '{text}' is not a number") from None
+    if value != value:
+        raise UserError(f"{where}: '{text}' is not a number")
+    return value

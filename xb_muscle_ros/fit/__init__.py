@@ -1,0 +1,1 @@
+"""A fibre's parameters from its recordings, and how well they are known."""

@@ -1,0 +1,222 @@
+"""What a fit may move: model parameters and faults of the measurement, each with scale, bounds and prior."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.measurement.faults import FAULTS, Scope
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.parameters import PARAMETERS
+
+Array = npt.NDArray[np.float64]
+
+# What the paper fitted, over all its models (van der Zee et al. 2026, "Fitted model parameters").
+FITTED = (
+    "f",
+    "k11",
+    "k21",
+    "k22",
+    "dLcrit",
+    "kon",
+    "koop",
+    "kappa",
+    "n",
+    "JF",
+    "vmax",
+    "act_max",
+    "kse",
+    "kse0",
+    "kpe",
+    "Fpe0",
+)
+# How far a fit may go from its start where nothing else is said: a factor either way.
+REACH = 100.0
+# Default prior on a logarithmic scale: two thirds within a factor of e of the start, as wide as the released sets of
+# seven fibres differ, or wider; on a linear scale the start itself is the standard deviation. Without any prior,
+# cooperativity runs off to where force jumps between two steady states, and a fit can park a trial on the edge of it.
+PRIOR_LOG_SD = 1.0
+# Fibres of one study resemble each other more than the next one will.
+LEAST_POPULATION_LOG_SD = 0.2
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One number that a fit moves.
+
+    Attributes:
+        name: of the parameter or fault.
+        group: of a fault: the trial or solution whose own it is, or empty; None for a model parameter.
+        log: whether it is moved on a logarithmic scale.
+        lower, upper: bounds, in its unit.
+        start: where the first start begins.
+        prior_mean, prior_sd: normal prior on the moved scale (natural logarithm where `log`); sd inf: none.
+    """
+
+    name: str
+    group: str | None
+    log: bool
+    lower: float
+    upper: float
+    start: float
+    prior_mean: float
+    prior_sd: float
+
+    @property
+    def label(self) -> str:
+        """Name, with the group in brackets."""
+        return f"{self.name}[{self.group}]" if self.group else self.name
+
+    def inward(self, value: float) -> float:
+        """A value on the moved scale."""
+        return math.log(value) if self.log else value
+
+    def outward(self, moved: float) -> float:
+        """A value in its unit."""
+        return math.exp(moved) if self.log else moved
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What the user says about one model parameter; None: the default.
+
+    Attributes:
+        lower, upper: bounds, in its unit.
+        prior_mean, prior_sd: in its unit; sd as a factor minus 1 on a logarithmic scale (0.2: 20 %); inf: no prior.
+    """
+
+    lower: float | None = None
+    upper: float | None = None
+    prior_mean: float | None = None
+    prior_sd: float | None = None
+
+
+def parameter_coordinates(
+    fibre: Fibre,
+    free: Sequence[str] | None,
+    fixed: Sequence[str],
+    ties: Mapping[str, str],
+    choices: Mapping[str, Choice],
+) -> tuple[Coordinate, ...]:
+    """Coordinates of a model's parameters.
+
+    Args:
+        fibre: start values, model and method.
+        free: names to move; None: those that the paper fitted.
+        fixed: names not to move.
+        ties: name -> name whose value it takes.
+        choices: bounds and priors by name.
+
+    Raises:
+        UserError: a name the model does not have; bounds that are crossed, beyond the parameter's range or off its
+            start.
+    """
+    for name in (*(free or ()), *fixed, *ties, *ties.values(), *choices):
+        if name not in fibre.values or name not in PARAMETERS:
+            raise UserError(f"model {fibre.model} has no parameter '{name}'{suggest(name, fibre.values)}")
+    names = [n for n in (FITTED if free is None else free) if n in fibre.values and n not in fixed and n not in ties]
+    for name in choices:
+        if name not in names and name not in FITTED:
+            raise UserError(f"parameter '{name}' has a bound or prior but is not fitted; add it to --free")
+    for tied, source in ties.items():
+        if source in ties:
+            raise UserError(f"parameter '{tied}' is tied to '{source}', which is tied itself; tie both to a third one")
+    return tuple(_parameter(fibre, name, choices.get(name, Choice())) for name in dict.fromkeys(names))
+
+
+def _parameter(fibre: Fibre, name: str, choice: Choice) -> Coordinate:
+    row, start = PARAMETERS[name], float(fibre.values[name])
+    log = row.lower >= 0.0 and start > 0.0
+    lower = max(row.lower, start / REACH) if log else row.lower
+    upper = min(row.upper, start * REACH) if log else row.upper
+    lower = lower if choice.lower is None else choice.lower
+    upper = upper if choice.upper is None else choice.upper
+    where = f"parameter '{name}'"
+    if not row.lower <= lower < upper <= row.upper:
+        raise UserError(
+            f"{where}: bounds {lower:g} to {upper:g} {row.unit}; allowed are bounds in order within "
+            f"{row.lower:g} to {row.upper:g}"
+        )
+    if log and lower <= 0.0:
+        raise UserError(f"{where}: lower bound {lower:g} on a logarithmic scale; give one above 0")
+    if not lower <= start <= upper:
+        raise UserError(
+            f"{where}: starts at {start:g} {row.unit}, outside its bounds {lower:g} to {upper:g}; widen them, or "
+            "start from another fibre file"
+        )
+    mean = start if choice.prior_mean is None else choice.prior_mean
+    default = math.expm1(PRIOR_LOG_SD) if log else abs(start) or math.inf
+    sd = default if choice.prior_sd is None else choice.prior_sd
+    if not sd > 0.0 or (log and mean <= 0.0):
+        raise UserError(f"{where}: prior {mean:g} ± {sd:g}; needed is an sd above 0 and a mean that is allowed")
+    scaled = (math.log(mean), math.log1p(sd)) if log else (mean, sd)
+    return Coordinate(name, None, log, lower, upper, start, *scaled)
+
+
+def population_choices(fibres: Sequence[Fibre], choices: Mapping[str, Choice]) -> dict[str, Choice]:
+    """Priors from what a parameter is in other fibres, for those whose prior nobody chose.
+
+    Args:
+        fibres: of the model that is fitted; at least three, each with its own values.
+        choices: of the user, which stay.
+
+    Raises:
+        UserError: too few fibres.
+    """
+    if len(fibres) < 3:
+        raise UserError(f"priors from {len(fibres)} fibres; at least 3 are needed to know how fibres differ")
+    made = dict(choices)
+    for name in FITTED:
+        values = [fibre.values[name] for fibre in fibres if name in fibre.values]
+        if len(values) < len(fibres) or min(values) <= 0.0 or made.get(name, Choice()).prior_mean is not None:
+            continue
+        logs = np.log(values)
+        # A new fibre differs from the mean of n by the spread and by the mean's own error.
+        sd = max(float(np.std(logs, ddof=1)) * math.sqrt(1.0 + 1.0 / len(values)), LEAST_POPULATION_LOG_SD)
+        mean = float(np.exp(np.mean(logs)))
+        made[name] = replace(made.get(name, Choice()), prior_mean=mean, prior_sd=math.expm1(sd))
+    return made
+
+
+def fault_coordinates(
+    names: Sequence[str], trials: Sequence[str], solutions: Sequence[str], sds: Mapping[str, float]
+) -> tuple[Coordinate, ...]:
+    """Coordinates of faults, one for each trial, solution or study that has its own value.
+
+    Args:
+        names: of `FAULTS`.
+        trials, solutions: names of the trials, and of the solution of each.
+        sds: standard deviations that replace those of the table.
+
+    Raises:
+        UserError: a name that is no fault, or an sd that is not above 0.
+    """
+    found = []
+    for name in dict.fromkeys(names):
+        if name not in FAULTS:
+            raise UserError(f"measurement fault '{name}' is not known{suggest(name, FAULTS)}")
+        row = FAULTS[name]
+        sd = sds.get(name, row.sd)
+        if not sd > 0.0:
+            raise UserError(f"measurement fault '{name}': sd {sd:g} {row.unit}; allowed is above 0")
+        groups = {Scope.TRIAL: trials, Scope.SOLUTION: solutions, Scope.STUDY: ("",)}[row.scope]
+        found += [Coordinate(name, g, False, row.lower, row.upper, 0.0, 0.0, sd) for g in dict.fromkeys(groups)]
+    return tuple(found)
+
+
+def to_json(coordinates: Sequence[Coordinate]) -> list[dict[str, Any]]:
+    """Plain data; a missing prior is null."""
+    return [{**c.__dict__, "prior_sd": None if math.isinf(c.prior_sd) else c.prior_sd} for c in coordinates]
+
+
+def from_json(rows: Sequence[Mapping[str, Any]]) -> tuple[Coordinate, ...]:
+    """Coordinates from plain data."""
+    return tuple(
+        Coordinate(**{**row, "prior_sd": math.inf if row["prior_sd"] is None else row["prior_sd"]}) for row in rows
+    )

@@ -1,0 +1,126 @@
+"""Trials as a fit sees them: what the fibre was given sample by sample, and which measured force counts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.replay.offline import calcium_per_step
+from xb_muscle_ros.scores.rmsd import windows
+from xb_muscle_ros.trials.ros_types import to_ns
+from xb_muscle_ros.trials.trial import Trial
+
+Array = npt.NDArray[np.float64]
+
+_ARRAYS = ("time_s", "length_l0", "calcium_um", "force_time_s", "measured_f0")
+
+
+@dataclass(frozen=True)
+class FitTrial:
+    """One trial, ready to be simulated and compared.
+
+    Attributes:
+        name: of the trial.
+        solution: of the bathing solution; trials of one share its faults.
+        order: how many trials of the fibre came before it.
+        held_out: whether it is kept out of the fit.
+        weight: of its squared error.
+        isometric_s: end of the isometric phase that the trial begins with, s; its start where it begins with none.
+        time_s, length_l0, calcium_um: shape (n,); calcium acts in the step that ends at a sample.
+        force_time_s, measured_f0: shape (k,); the force that counts, within the trial's window.
+    """
+
+    name: str
+    solution: str
+    order: int
+    held_out: bool
+    weight: float
+    isometric_s: float
+    time_s: Array
+    length_l0: Array
+    calcium_um: Array
+    force_time_s: Array
+    measured_f0: Array
+
+    @property
+    def dt_s(self) -> Array:
+        """Time between samples in whole nanoseconds, as messages have it, shape (n - 1,)."""
+        steps: Array = np.diff(to_ns(self.time_s)) / 1e9
+        return steps
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {**self.__dict__, **{name: getattr(self, name).tolist() for name in _ARRAYS}}
+
+    @staticmethod
+    def from_json(row: Mapping[str, Any]) -> FitTrial:
+        """A trial from plain data."""
+        return FitTrial(**{**row, **{name: np.array(row[name], dtype=np.float64) for name in _ARRAYS}})
+
+
+def fit_trials(
+    trials: Sequence[Trial], held_out: Sequence[bool], whole: bool = False, weights: Mapping[str, float] | None = None
+) -> tuple[FitTrial, ...]:
+    """Trials of one fibre in the order in which they were recorded.
+
+    Args:
+        trials: with measured force.
+        held_out: for each trial, whether it is kept out.
+        whole: compare the whole trial rather than the paper's window (0.0843 s before the first stretch to 0.0843 s
+            after the test stretch, see `scores.rmsd.windows`).
+        weights: of single trials by name; others weigh 1.
+
+    Raises:
+        UserError: a trial without force, two of one name, an unknown name among the weights.
+    """  # fmt: skip
+    weights = weights or {}
+    names = [trial.facts.trial for trial in trials]
+    for name in names:
+        if names.count(name) > 1:
+            raise UserError(f"trial {name} is there {names.count(name)} times; give each trial once")
+    for name, weight in weights.items():
+        if name not in names:
+            raise UserError(f"weight of trial '{name}', which is not among the bags; there are {', '.join(names)}")
+        if not weight >= 0.0:
+            raise UserError(f"weight of trial '{name}' is {weight:g}; allowed is 0 and above")
+    return tuple(
+        _fit_trial(trial, i, out, whole, float(weights.get(trial.facts.trial, 1.0)))
+        for i, (trial, out) in enumerate(zip(trials, held_out, strict=True))
+    )
+
+
+def _fit_trial(trial: Trial, order: int, held_out: bool, whole: bool, weight: float) -> FitTrial:
+    name = trial.facts.trial
+    if not trial.force_n.size:
+        raise UserError(f"trial {name} has no measured force; a fit needs it, leave the bag out")
+    window = (
+        (trial.time_s[0], trial.time_s[-1]) if whole else windows(trial)["whole"] or (trial.time_s[0], trial.time_s[-1])
+    )
+    early, late = max(window[0], trial.time_s[0]), min(window[1], trial.time_s[-1])
+    inside = (trial.force_time_s >= early - 5e-10) & (trial.force_time_s <= late + 5e-10)
+    if np.count_nonzero(inside) < 10:
+        raise UserError(
+            f"trial {name}: {np.count_nonzero(inside)} samples of force between {early:g} and {late:g} s; at least 10 "
+            "are needed, leave the bag out"
+        )
+    # Nothing after the window bears on the force within it.
+    last = min(int(np.searchsorted(trial.time_s, late - 5e-10)) + 1, trial.time_s.size)
+    pca, phases = trial.facts.pca, trial.facts.phases
+    return FitTrial(
+        name=name,
+        solution="changing" if pca is None else f"pCa {pca:g}",
+        order=order,
+        held_out=held_out,
+        weight=weight,
+        isometric_s=float(phases[0].end_s if phases and phases[0].name == "isometric" else trial.time_s[0]),
+        time_s=trial.time_s[:last],
+        length_l0=trial.length_change_l0[:last],
+        calcium_um=calcium_per_step(trial)[:last],
+        force_time_s=trial.force_time_s[inside],
+        measured_f0=trial.measured_f0[inside],
+    )  # fmt: skip

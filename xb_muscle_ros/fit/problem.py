@@ -1,0 +1,147 @@
+"""The fit's problem: from a point to the difference between model and measurement, and its slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.fit import features
+from xb_muscle_ros.fit.coordinates import Coordinate, from_json, to_json
+from xb_muscle_ros.fit.data import FitTrial
+from xb_muscle_ros.fit.features import Feature
+from xb_muscle_ros.measurement.faults import FAULTS, Scope
+from xb_muscle_ros.measurement.recording import given_calcium, given_length, recorded_force
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.muscle import Muscle
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Trials of one fibre and what may be moved to meet them.
+
+    Attributes:
+        fibre: start values, model, method.
+        trials: training and held-out ones.
+        coordinates: what is moved.
+        ties: parameter -> parameter whose value it takes.
+        features: numbers to meet beside the traces; training and held-out ones.
+    """
+
+    fibre: Fibre
+    trials: tuple[FitTrial, ...]
+    coordinates: tuple[Coordinate, ...]
+    ties: Mapping[str, str]
+    features: tuple[Feature, ...] = ()
+
+    @property
+    def start(self) -> Array:
+        """Start of all coordinates on the moved scale."""
+        return np.array([c.inward(c.start) for c in self.coordinates])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Bounds on the moved scale."""
+        lower = np.array([c.inward(c.lower) for c in self.coordinates])
+        return lower, np.array([c.inward(c.upper) for c in self.coordinates])
+
+    def fibre_at(self, z: Array) -> Fibre:
+        """The fibre with the parameters of a point."""
+        values = dict(self.fibre.values)
+        for c, moved in zip(self.coordinates, z, strict=True):
+            if c.group is None:
+                values[c.name] = c.outward(float(moved))
+        for tied, source in self.ties.items():
+            values[tied] = values[source]
+        return replace(self.fibre, values=MappingProxyType(values))
+
+    def faults_at(self, z: Array, trial: FitTrial) -> dict[str, float]:
+        """Faults of a trial at a point; those of a solution or trial that was not fitted are 0."""
+        return {
+            c.name: float(moved)
+            for c, moved in zip(self.coordinates, z, strict=True)
+            if c.group is not None and touches(c, trial)
+        }
+
+    def true_force(self, muscle: Muscle, z: Array, trial: FitTrial) -> Array:
+        """The fibre's force at the trial's samples, F0, before the recording's faults.
+
+        Raises:
+            UserError, StateViolation: see `Muscle.settle` and `Muscle.run`.
+        """
+        faults = self.faults_at(z, trial)
+        length = given_length(trial.length_l0, faults)
+        calcium = given_calcium(trial.calcium_um, faults)
+        state = muscle.settle(float(length[0]), float(calcium[0]))
+        return muscle.outputs_of(muscle.run(state, trial.dt_s, length, calcium))["force_f0"]
+
+    def recorded(self, z: Array, trial: FitTrial, force_f0: Array) -> Array:
+        """Force as the file would hold it, at the times that count."""
+        force = recorded_force(trial.time_s, force_f0, self.faults_at(z, trial), trial.order)
+        return np.interp(trial.force_time_s, trial.time_s, force)
+
+    def predicted(self, z: Array, trials: Sequence[FitTrial] | None = None) -> list[Array]:
+        """Recorded force of trials (default: all) at a point, F0.
+
+        Raises:
+            UserError, StateViolation: see `true_force`.
+        """
+        muscle = Muscle(self.fibre_at(z))
+        chosen = self.trials if trials is None else trials
+        return [self.recorded(z, trial, self.true_force(muscle, z, trial)) for trial in chosen]
+
+    def solution_shifts(self, z: Array) -> dict[float, float]:
+        """Fitted pCa shift of each solution by stated pCa; features meet the solutions that the trials met."""
+        return {
+            float(c.group.removeprefix("pCa ")): float(moved)
+            for c, moved in zip(self.coordinates, z, strict=True)
+            if c.name == "pca_shift" and c.group is not None and c.group.startswith("pCa ")
+        }
+
+    def prior(self, z: Array) -> Array:
+        """Distance from the priors in standard deviations, shape (coordinates,); 0 where there is none."""
+        means = np.array([c.prior_mean for c in self.coordinates])
+        sds = np.array([c.prior_sd for c in self.coordinates])
+        distance: Array = np.where(np.isfinite(sds), (z - means) / sds, 0.0)
+        return distance
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data, so that a worker elsewhere can have it."""
+        fibre = {**self.fibre.__dict__, "values": dict(self.fibre.values), "path": None}
+        return {
+            "fibre": {**fibre, "available_models": list(self.fibre.available_models)},
+            "trials": [trial.to_json() for trial in self.trials],
+            "coordinates": to_json(self.coordinates),
+            "ties": dict(self.ties),
+            "features": features.to_json(self.features),
+        }
+
+    @staticmethod
+    def from_json(row: Mapping[str, Any]) -> Problem:
+        """A problem from plain data."""
+        fibre = row["fibre"]
+        fixed = {
+            "values": MappingProxyType(dict(fibre["values"])),
+            "available_models": tuple(fibre["available_models"]),
+        }
+        return Problem(
+            fibre=Fibre(**{**fibre, **fixed}),
+            trials=tuple(FitTrial.from_json(trial) for trial in row["trials"]),
+            coordinates=from_json(row["coordinates"]),
+            ties=row["ties"],
+            features=features.from_json(row["features"]),
+        )  # fmt: skip
+
+
+def touches(c: Coordinate, trial: FitTrial) -> bool:
+    """Whether a coordinate bears on a trial."""
+    if c.group is None:
+        return True
+    scope = FAULTS[c.name].scope
+    return c.group == {Scope.TRIAL: trial.name, Scope.SOLUTION: trial.solution, Scope.STUDY: ""}[scope]

@@ -1,0 +1,275 @@
+"""What a fit found, as plain data, as lines for a terminal, and as a fibre file with its provenance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros import __version__
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.files import write_text
+from xb_muscle_ros.fit.calibration import calibrated_force
+from xb_muscle_ros.fit.coordinates import Coordinate
+from xb_muscle_ros.fit.data import FitTrial
+from xb_muscle_ros.fit.problem import Problem, touches
+from xb_muscle_ros.fit.run import Fitted
+from xb_muscle_ros.fit.training import Training
+from xb_muscle_ros.fit.uncertainty import correlation
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.fibre_writing import write_fibre
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.models.parameters import PARAMETERS
+from xb_muscle_ros.scores.rmsd import force_rmsd
+
+Array = npt.NDArray[np.float64]
+
+# From here on two coordinates are told to be hardly told apart.
+_TWINS = 0.95
+# Starts that end this much above the best one in RMSD ended elsewhere.
+_SAME = 0.05
+# So much of the way between its bounds counts as at a bound.
+_AT_BOUND = 1e-3
+
+
+def trial_rows(fitted: Fitted) -> list[dict[str, Any]]:
+    """RMSD (F0) of every trial, training and held-out, before the fit and after."""
+    rows = []
+    before, after = _rmsds(fitted.problem, fitted.problem.start), _rmsds(fitted.problem, fitted.best.z)
+    for trial, first, last in zip(fitted.problem.trials, before, after, strict=True):
+        rows.append(
+            {
+                "trial": trial.name,
+                "solution": trial.solution,
+                "held_out": trial.held_out,
+                "weight": trial.weight,
+                "rmsd_before_f0": first,
+                "rmsd_f0": last,
+                **_calibrated(fitted, trial),
+            }
+        )
+    return rows
+
+
+def _calibrated(fitted: Fitted, trial: FitTrial) -> dict[str, float | None]:
+    """RMSD (F0) of a held-out trial once its isometric force has told its pCa shift, where the fit had such shifts."""
+    shifts = [c for c in fitted.problem.coordinates if c.name == "pca_shift"]
+    if not (trial.held_out and shifts) or any(touches(c, trial) for c in shifts):
+        return {}
+    found = calibrated_force(fitted.problem, fitted.best.z, trial)
+    if found is None:
+        return {"rmsd_calibrated_f0": None, "pca_shift": None}
+    return {"rmsd_calibrated_f0": float(np.sqrt(np.mean((found[0] - trial.measured_f0) ** 2))), "pca_shift": found[1]}
+
+
+def _rmsds(problem: Problem, z: Array) -> list[float | None]:
+    """RMSD of each trial at a point, F0; None where the model has no solution there."""
+    found: list[float | None] = []
+    for trial in problem.trials:
+        try:
+            force = problem.predicted(z, [trial])[0]
+        except UserError:
+            found.append(None)
+            continue
+        everything = (float(trial.force_time_s[0]), float(trial.force_time_s[-1]))
+        found.append(force_rmsd(trial.force_time_s, force, trial.measured_f0, everything))
+    return found
+
+
+def mean_rmsd(rows: Sequence[Mapping[str, Any]], held_out: bool, key: str) -> float | None:
+    """Root mean square of the trials' RMSDs, F0; None where there are none."""
+    squares = [row[key] ** 2 for row in rows if row["held_out"] == held_out and row[key] is not None]
+    return math.sqrt(sum(squares) / len(squares)) if squares else None
+
+
+def parameter_rows(fitted: Fitted) -> list[dict[str, Any]]:
+    """Every coordinate with start, value, standard deviation and interval."""
+    lower, upper = fitted.problem.bounds
+    sds = np.sqrt(np.diag(fitted.shape.covariance))
+    rows = []
+    for j, c in enumerate(fitted.problem.coordinates):
+        z = float(fitted.best.z[j])
+        share = (z - lower[j]) / (upper[j] - lower[j])
+        row: dict[str, Any] = {
+            "name": c.name,
+            "group": c.group,
+            "unit": PARAMETERS[c.name].unit if c.group is None else _fault_unit(c),
+            "start": c.start,
+            "value": c.outward(z),
+            "log_scale": c.log,
+            # On a logarithmic scale a share of the value.
+            "sd": float(sds[j]),
+            "bounds": [c.lower, c.upper],
+            "prior_sd": None if math.isinf(c.prior_sd) else c.prior_sd,
+            "at_bound": "lower" if share < _AT_BOUND else "upper" if share > 1.0 - _AT_BOUND else None,
+        }
+        if j in fitted.sides:
+            low, high = fitted.sides[j]
+            row["interval"] = [c.outward(low.end), c.outward(high.end)]
+            row["interval_closed"] = [low.closed, high.closed]
+            row["profile"] = [[c.outward(x), root] for x, root in sorted({*low.points, *high.points})]
+        rows.append(row)
+    return rows
+
+
+def _fault_unit(c: Coordinate) -> str:
+    from xb_muscle_ros.measurement.faults import FAULTS
+
+    return FAULTS[c.name].unit
+
+
+def warnings(fitted: Fitted) -> list[str]:
+    """What a user should know before trusting the fit, one line each."""
+    found = []
+    coordinates = fitted.problem.coordinates
+    for j, row in enumerate(parameter_rows(fitted)):
+        label = coordinates[j].label
+        if row["at_bound"]:
+            bound = row["bounds"][0 if row["at_bound"] == "lower" else 1]
+            found.append(
+                f"{label} is at its {row['at_bound']} bound, {bound:g} {row['unit']}; widen it, or fix it there"
+            )
+        if "interval_closed" in row and not all(row["interval_closed"]):
+            sides = [s for s, closed in zip(("below", "above"), row["interval_closed"], strict=True) if not closed]
+            found.append(f"{label} is not identifiable: nothing in the data bounds it {' or '.join(sides)}")
+        elif bool(fitted.shape.weak[j]):
+            found.append(f"{label} is not identifiable on its own: the data see it only together with others")
+    matrix = correlation(fitted.shape.covariance)
+    for i in range(len(coordinates)):
+        for j in range(i):
+            if abs(matrix[i, j]) > _TWINS:
+                pair = f"{coordinates[j].label} and {coordinates[i].label}"
+                found.append(f"{pair} are hardly told apart (correlation {matrix[i, j]:.2f}); fix or tie one of them")
+    ends = [s for s in fitted.starts if s is not None]
+    best = min((s.cost for s in ends), default=0.0)
+    off = [s for s in ends if s.cost > best + max(2.0, _SAME * best)]
+    if off:
+        found.append(
+            f"starts disagree: {len(off)} of {len(ends)} ended in worse places; trust the fit only with more starts"
+        )
+    lost = len(fitted.starts) - len(ends)
+    if lost:
+        found.append(f"{lost} of {len(fitted.starts)} starts led nowhere, because the model has no solution there")
+    if not fitted.best.converged:
+        found.append("the descent was cut short before it came to rest; start again from the file it wrote")
+    if not fitted.settled:
+        found.append("profiles went on finding better points: the minimum is not settled; give more starts")
+    return found
+
+
+def as_json(fitted: Fitted, provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """Everything, for ``fit.json``."""
+    rows = trial_rows(fitted)
+    problem = fitted.problem
+    training = Training(problem)
+    return {
+        "version": __version__,
+        "fibre": problem.fibre.name,
+        "model": problem.fibre.model,
+        "method": problem.fibre.method,
+        "provenance": dict(provenance),
+        "seed": fitted.settings.seed,
+        "level": fitted.settings.level,
+        "cost": fitted.best.cost,
+        "converged": fitted.best.converged,
+        "settled": fitted.settled,
+        "scale": fitted.scale._asdict(),
+        "train_rmsd_f0": mean_rmsd(rows, False, "rmsd_f0"),
+        "heldout_rmsd_f0": mean_rmsd(rows, True, "rmsd_f0"),
+        "before": {
+            "train_rmsd_f0": mean_rmsd(rows, False, "rmsd_before_f0"),
+            "heldout_rmsd_f0": mean_rmsd(rows, True, "rmsd_before_f0"),
+        },
+        "trials": rows,
+        "features": [
+            {**f.__dict__, "model": f.value + float(d) * f.sd}
+            for f, d in zip(training.features, training.feature_distance(fitted.best.z), strict=True)
+        ],
+        "parameters": parameter_rows(fitted),
+        "ties": dict(problem.ties),
+        "correlation": {
+            "names": [c.label for c in problem.coordinates],
+            "matrix": correlation(fitted.shape.covariance).tolist(),
+        },
+        "starts": [
+            None if s is None else {"cost": s.cost, "rmsd_f0": s.rmsd_f0, "evaluations": s.evaluations}
+            for s in fitted.starts
+        ],
+        "warnings": warnings(fitted),
+    }
+
+
+def table(found: Mapping[str, Any]) -> str:
+    """Lines for a terminal."""
+    lines = [f"{'parameter':24s} {'start':>11s} {'fitted':>11s}  {'interval':25s} unit"]
+    for row in found["parameters"]:
+        label = f"{row['name']}[{row['group']}]" if row["group"] else row["name"]
+        interval = ""
+        if "interval" in row:
+            (low, high), (left, right) = row["interval"], row["interval_closed"]
+            interval = f"{'' if left else '<'}{low:.4g} to {'' if right else '>'}{high:.4g}"
+        lines.append(f"{label:24s} {row['start']:11.5g} {row['value']:11.5g}  {interval:25s} {row['unit']}")
+    lines += ["", f"{'trial':40s} {'':9s} {'before':>8s} {'after':>8s}  RMSD, % F0"]
+    for row in found["trials"]:
+        what = "held out" if row["held_out"] else "training" if row["weight"] > 0.0 else "no weight"
+        line = f"{row['trial']:40s} {what:9s} {_percent(row['rmsd_before_f0'])} {_percent(row['rmsd_f0'])}"
+        if row.get("rmsd_calibrated_f0") is not None:
+            calibrated = _percent(row["rmsd_calibrated_f0"]).strip()
+            line += f"; {calibrated} with the pCa shift of its isometric force ({row['pca_shift']:+.3f})"
+        lines.append(line)
+    for key, what in (("train_rmsd_f0", "training"), ("heldout_rmsd_f0", "held out")):
+        if found[key] is not None:
+            lines.append(f"{'all':40s} {what:9s} {_percent(found['before'][key])} {_percent(found[key])}")
+    return "\n".join(lines)
+
+
+def _percent(value: float | None) -> str:
+    return f"{'-':>8s}" if value is None else f"{100.0 * value:8.3f}"
+
+
+def write_fitted(path: Path, fitted: Fitted, found: Mapping[str, Any]) -> Fibre:
+    """Write the fitted fibre; the file tells data, split, seed and cost.
+
+    Raises:
+        UserError: see `write_fibre`.
+    """
+    fibre = fitted.problem.fibre_at(fitted.best.z)
+    data = found["provenance"]
+    where = f", RMSD {100.0 * found['train_rmsd_f0']:.3f} % F0" if found["train_rmsd_f0"] is not None else ""
+    features = len(Training(fitted.problem).features)
+    training = [row["trial"] for row in found["trials"] if not row["held_out"] and row["weight"] > 0.0]
+    held = [row["trial"] for row in found["trials"] if row["held_out"]]
+    source = (
+        f"fitted with xb_muscle {__version__} to {len(training)} trials and {features} features of "
+        f"{data['fibre_of_trials']}{where}; started from {data['start']}"
+    )
+    fibre = replace(fibre, source=source, path=None)
+    faults = [f"{c.label} {c.outward(float(z)):.4g}" for c, z in _faults(fitted)]
+    comments = [
+        f"Fibre {fibre.name}, model {fibre.model}, method {fibre.method}; everything on the fit is in {data['json']}.",
+        f"Trials fitted: {', '.join(training)}.",
+        f"Trials held out: {', '.join(held) or 'none'}.",
+        f"Seed {fitted.settings.seed}, {fitted.settings.starts} starts, cost {found['cost']:.6g}.",
+        f"Faults of the measurement that were fitted beside: {', '.join(faults) or 'none'}.",
+    ]
+    write_fibre(path, fibre, comments)
+    # Validate what a user will load, with its own parameters compiled.
+    Muscle(fibre)
+    return fibre
+
+
+def _faults(fitted: Fitted) -> list[tuple[Coordinate, float]]:
+    pairs = zip(fitted.problem.coordinates, fitted.best.z.tolist(), strict=True)
+    return [(c, z) for c, z in pairs if c.group is not None]
+
+
+def write_json(path: Path, found: Mapping[str, Any]) -> None:
+    """Write ``fit.json``."""
+    import json
+
+    write_text(path, json.dumps(found, indent=1, allow_nan=False) + "\n")

@@ -1,0 +1,183 @@
+"""A whole fit: several starts, the best one polished, and its coordinates profiled."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.features import F0_ANCHOR
+from xb_muscle_ros.fit.noise import FIRST, Scale, scale_of
+from xb_muscle_ros.fit.problem import Problem
+from xb_muscle_ros.fit.solve import Objective, Solution, descend
+from xb_muscle_ros.fit.training import Training, finite_start
+from xb_muscle_ros.fit.uncertainty import Curvature, Side, curvature, profile_side
+from xb_muscle_ros.progress import Progress
+from xb_muscle_ros.work import Options, run, stream
+
+Array = npt.NDArray[np.float64]
+
+# Spread of further starts around the first, on the moved scale; of faults in their standard deviations.
+_SPREAD, _FAULT_SPREAD = 0.7, 0.5
+# How often a profile may find a better point before the fit is called unsettled.
+_RESTARTS = 3
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How hard to look.
+
+    Attributes:
+        starts: descents, the first from the fibre's own values.
+        seed: of the other starts.
+        level: of the intervals; None leaves them out.
+    """
+
+    starts: int = 4
+    seed: int = 1
+    level: float | None = 0.95
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """What a fit found.
+
+    Attributes:
+        problem: what was asked.
+        settings: how.
+        best: the best point; its cost is in the units of `scale`.
+        scale: of the differences that the fit left.
+        starts: every descent, in order; None where the model had no solution at its start.
+        shape: curvature and covariance at the best point.
+        sides: lower and upper end of each model parameter's interval, by its index; empty without a level.
+        settled: False where profiles went on finding better points.
+    """
+
+    problem: Problem
+    settings: Settings
+    best: Solution
+    scale: Scale
+    starts: tuple[Solution | None, ...]
+    shape: Curvature
+    sides: Mapping[int, tuple[Side, Side]]
+    settled: bool
+
+
+def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
+    """Find the best point from several starts, and how well it is known.
+
+    Args:
+        problem: trials and coordinates.
+        settings: starts, seed, level.
+        options: where the work is done; finished starts and profiles are kept in the journal.
+
+    Raises:
+        UserError: no coordinate to move, nothing to fit to, no finite start, and what `work.run` raises.
+    """
+    if not problem.coordinates:
+        raise UserError("nothing is free to be fitted; name parameters with --free or faults with --nuisance")
+    training = Training(problem)
+    # What every fibre meets by definition is nothing to fit to.
+    if not training.trials and all(f == F0_ANCHOR for f in training.features):
+        raise UserError(f"all {len(problem.trials)} trials are held out or weigh nothing; leave at least one to fit to")
+    finite_start(training)
+    plain = problem.to_json()
+    tasks = [{"problem": plain, "z": z.tolist(), "scale": list(FIRST)} for z in _starts(problem, settings)]
+    starts = _descended(tasks, options)
+    found = [s for s in starts if s is not None]
+    best, scale = min(found, key=lambda s: s.cost), FIRST
+    sides: dict[int, tuple[Side, Side]] = {}
+    settled = False
+    for _ in range(_RESTARTS):
+        best, scale = _polished(plain, training, best, options)
+        shape = curvature(Objective(training, scale), best.z)
+        if settings.level is None:
+            settled = True
+            break
+        sides, better = _profiles(plain, problem, best, scale, settings.level, options)
+        settled = better is None
+        if better is None:
+            break
+        best = best._replace(z=better)
+    return Fitted(problem, settings, best, scale, tuple(starts), shape, sides, settled)
+
+
+def start_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
+    """One descent; None where it begins and ends without a solution."""
+    objective = Objective(Training(Problem.from_json(task["problem"])), Scale(*task["scale"]))
+    found = descend(objective, np.array(task["z"]))
+    return None if not np.isfinite(found.rmsd_f0) else _solution_to_json(found)
+
+
+def profile_task(task: Mapping[str, Any]) -> dict[str, Any]:
+    """One side of one profile."""
+    objective = Objective(Training(Problem.from_json(task["problem"])), Scale(*task["scale"]))
+    best = _solution_from_json(task["best"])
+    shape = curvature(objective, best.z)
+    return profile_side(objective, best, task["index"], task["up"], shape, task["level"])._asdict()
+
+
+def _starts(problem: Problem, settings: Settings) -> list[Array]:
+    """Where descents begin: the fibre's own values, then random points around them within the bounds."""
+    if settings.starts < 1:
+        raise UserError(f"number of starts is {settings.starts}; allowed is 1 and more")
+    random = np.random.default_rng(settings.seed)
+    lower, upper = problem.bounds
+    spread = np.array([_SPREAD if c.log else _FAULT_SPREAD * min(c.prior_sd, 1.0) for c in problem.coordinates])
+    others = [problem.start + spread * random.normal(size=lower.size) for _ in range(settings.starts - 1)]
+    return [np.clip(z, lower, upper) for z in (problem.start, *others)]
+
+
+def _descended(tasks: Sequence[Mapping[str, Any]], options: Options) -> list[Solution | None]:
+    """All descents, telling the best so far."""
+    found: list[Solution | None] = [None] * len(tasks)
+    best = float("inf")
+    for index, row in stream(start_task, tasks, replace(options, label="starts")):
+        if row is None:
+            continue
+        found[index] = solution = _solution_from_json(row)
+        if solution.cost < best:
+            best = solution.cost
+            if not options.quiet:
+                what = (
+                    f"cost {solution.cost:.6g}, {100.0 * solution.rmsd_f0:.3f} % F0, {solution.evaluations} evaluations"
+                )
+                Progress.write(f"start {index + 1} of {len(tasks)}: {what}, the best so far", sys.stderr)
+    return found
+
+
+def _polished(plain: Mapping[str, Any], training: Training, best: Solution, options: Options) -> tuple[Solution, Scale]:
+    """The best point under the scale that the residuals turn out to have."""
+    residual = training.force(best.z) - training.measured
+    scale = scale_of([residual[s] for s in training.slices()], best.z.size)
+    task = {"problem": plain, "z": best.z.tolist(), "scale": list(scale)}
+    row = run(start_task, [task], replace(options, label="polish", processes=0 if options.scheduler is None else None))[
+        0
+    ]
+    return (best if row is None else _solution_from_json(row)), scale
+
+
+def _profiles(
+    plain: Mapping[str, Any], problem: Problem, best: Solution, scale: Scale, level: float, options: Options
+) -> tuple[dict[int, tuple[Side, Side]], Array | None]:
+    """Both sides of every model parameter's profile, or a better point that one of them met."""
+    chosen = [j for j, c in enumerate(problem.coordinates) if c.group is None]
+    task = {"problem": plain, "best": _solution_to_json(best), "scale": list(scale), "level": level}
+    tasks = [{**task, "index": j, "up": up} for j in chosen for up in (False, True)]
+    rows = run(profile_task, tasks, replace(options, label="profiles"))
+    sides = [Side(r["end"], r["closed"], [(x, y) for x, y in r["points"]], r["better"]) for r in rows]
+    better = next((np.array(side.better) for side in sides if side.better is not None), None)
+    return {j: (sides[2 * k], sides[2 * k + 1]) for k, j in enumerate(chosen)}, better
+
+
+def _solution_to_json(s: Solution) -> dict[str, Any]:
+    return {**s._asdict(), "z": s.z.tolist()}
+
+
+def _solution_from_json(row: Mapping[str, Any]) -> Solution:
+    return Solution(**{**row, "z": np.array(row["z"])})

@@ -1,0 +1,81 @@
+"""Which trials are kept out of a fit: by name, by condition, or as the paper did."""
+
+from __future__ import annotations
+
+import fnmatch
+from collections.abc import Callable, Sequence
+
+from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.trials.trial import TrialFacts
+
+# Conditions are nominal; measured amplitudes differ from them by up to 6 %.
+_NEAR = {"pca": 0.01, "amplitude": 0.003, "recovery": 0.0}
+_RECOVERY_FACTOR = 1.5
+
+
+def _close(key: str, value: float | None, wanted: float) -> bool:
+    if value is None:
+        return False
+    if key == "recovery":
+        return wanted / _RECOVERY_FACTOR <= value <= wanted * _RECOVERY_FACTOR
+    return abs(value - wanted) <= _NEAR[key]
+
+
+def _rule(text: str) -> Callable[[TrialFacts], bool]:
+    """A test of a trial from ``KEY=VALUE``; keys are trial (with * and ?), pca, amplitude (L0) and recovery (s)."""
+    key, equals, value = text.partition("=")
+    if not equals or key not in ("trial", *_NEAR):
+        raise UserError(
+            f"rule '{text}' is not KEY=VALUE{suggest(key, ('trial', *_NEAR))}; for example pca=6.3 or trial=triangle*"
+        )
+    if key == "trial":
+        return lambda facts: fnmatch.fnmatchcase(facts.trial, value)
+    try:
+        wanted = float(value)
+    except ValueError:
+        raise UserError(f"rule '{text}': '{value}' is not a number; for example {key}=6.3") from None
+    read: dict[str, Callable[[TrialFacts], float | None]] = {
+        "pca": lambda facts: facts.pca,
+        "amplitude": lambda facts: facts.amplitude_l0,
+        "recovery": lambda facts: facts.recovery_s,
+    }
+    return lambda facts: _close(key, read[key](facts), wanted)
+
+
+def paper_training(facts: TrialFacts) -> bool:
+    """Whether the paper fitted to such a trial: AMP 3.83 % with RT 0.1 s, and the stretch without any before it.
+
+    The authors' programs (github timvanderzee/biophysical-muscle-model, Fitting) name the two.
+    """
+    unconditioned = facts.amplitude_l0 is None or facts.amplitude_l0 < 1e-3
+    return unconditioned or (
+        _close("amplitude", facts.amplitude_l0, 0.0383) and _close("recovery", facts.recovery_s, 0.1)
+    )
+
+
+def held_out(
+    trials: Sequence[TrialFacts], hold_out: Sequence[str], train: Sequence[str], preset: str | None
+) -> list[bool]:
+    """For each trial, whether it is kept out.
+
+    Args:
+        trials: facts of the trials.
+        hold_out: rules ``KEY=VALUE``; a trial that meets any is kept out.
+        train: rules; where there are some, a trial that meets none is kept out.
+        preset: ``paper`` or None.
+
+    Raises:
+        UserError: a malformed rule, a rule that no trial meets, an unknown preset.
+    """  # fmt: skip
+    if preset not in (None, "paper"):
+        raise UserError(f"split '{preset}' is not known; there is paper")
+    for text in (*hold_out, *train):
+        if not any(_rule(text)(facts) for facts in trials):
+            raise UserError(f"no trial meets the rule '{text}'; trials are {', '.join(f.trial for f in trials)}")
+    out, wanted = [_rule(text) for text in hold_out], [_rule(text) for text in train]
+    return [
+        any(rule(facts) for rule in out)
+        or (bool(wanted) and not any(rule(facts) for rule in wanted))
+        or (preset == "paper" and not paper_training(facts))
+        for facts in trials
+    ]

@@ -1,0 +1,116 @@
+"""The training data and the model's answer to them at points, with its slopes."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit import features
+from xb_muscle_ros.fit.coordinates import Coordinate
+from xb_muscle_ros.fit.problem import Problem, touches
+from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.models.muscle import Muscle
+
+Array = npt.NDArray[np.float64]
+
+# Step of the slopes on the moved scale, against errors of the steps of 1e-6: wrong by some 1e-4.
+_STEP = 1e-4
+
+
+class Training:
+    """Training data and the model's answer at points: forces of trials, then features; remembers the last point."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        self.trials = tuple(t for t in problem.trials if not t.held_out and t.weight > 0.0)
+        self.features = tuple(f for f in problem.features if not f.held_out)
+        self.sizes = [t.measured_f0.size for t in self.trials]
+        self.ends = np.cumsum([0, *self.sizes])
+        self.measured = np.concatenate([t.measured_f0 for t in self.trials] + [np.empty(0)])
+        self._at: tuple[bytes, list[Array]] | None = None
+
+    def slices(self) -> list[slice]:
+        """Where each trial lies in the concatenated forces."""
+        return [slice(a, b) for a, b in zip(self.ends[:-1], self.ends[1:], strict=True)]
+
+    def force(self, z: Array) -> Array:
+        """Recorded force of all training trials, concatenated, F0.
+
+        Raises:
+            UserError, StateViolation: see `Problem.true_force`.
+        """
+        true = self._true(z)
+        found = [self.problem.recorded(z, t, f) for t, f in zip(self.trials, true, strict=True)]
+        return np.concatenate([*found, np.empty(0)])
+
+    def feature_distance(self, z: Array) -> Array:
+        """Model minus measured feature in standard deviations, shape (features,).
+
+        Raises:
+            UserError, StateViolation: see `features.simulated`.
+        """
+        if not self.features:
+            return np.empty(0)
+        found = features.simulated(Muscle(self.problem.fibre_at(z)), self.features, self.problem.solution_shifts(z))
+        distance: Array = (found - [f.value for f in self.features]) / [f.sd for f in self.features]
+        return distance
+
+    def _true(self, z: Array) -> list[Array]:
+        key = z.tobytes()
+        if self._at is None or self._at[0] != key:
+            muscle = Muscle(self.problem.fibre_at(z))
+            self._at = (key, [self.problem.true_force(muscle, z, t) for t in self.trials])
+        return self._at[1]
+
+    def slopes(self, z: Array) -> tuple[Array, Array]:
+        """Derivatives of `force` and of `feature_distance` by the coordinates, by differences.
+
+        A coordinate at its upper bound, or whose step forward leaves the model without a solution, is stepped back.
+
+        Returns:
+            shapes (samples, coordinates) and (features, coordinates).
+        """
+        true, force, distance = self._true(z), self.force(z), self.feature_distance(z)
+        upper = self.problem.bounds[1]
+        of_force, of_features = np.zeros((force.size, z.size)), np.zeros((distance.size, z.size))
+        for j, c in enumerate(self.problem.coordinates):
+            step = _STEP if c.group is None else _STEP * FAULTS[c.name].sd / 0.05
+            for signed in (-step, step) if z[j] + step > upper[j] else (step, -step):
+                moved = z.copy()
+                moved[j] += signed
+                try:
+                    of_force[:, j] = (self._stepped(moved, c, true, force) - force) / signed
+                    if c.group is None or c.name == "pca_shift":
+                        of_features[:, j] = (self.feature_distance(moved) - distance) / signed
+                    break
+                except UserError:
+                    continue
+        return of_force, of_features
+
+    def _stepped(self, moved: Array, c: Coordinate, true: list[Array], base: Array) -> Array:
+        """Recorded force with one coordinate moved; only what it bears on is computed again."""
+        problem = self.problem
+        again = c.group is None or FAULTS[c.name].on_input
+        muscle = Muscle(problem.fibre_at(moved)) if again else None
+        out = base.copy()
+        for trial, force, here in zip(self.trials, true, self.slices(), strict=True):
+            if touches(c, trial):
+                simulated = force if muscle is None else problem.true_force(muscle, moved, trial)
+                out[here] = problem.recorded(moved, trial, simulated)
+        return out
+
+
+def finite_start(training: Training) -> None:
+    """Check that the model has a solution at the start.
+
+    Raises:
+        UserError: it has none; says which state stopped it.
+    """
+    try:
+        force = training.force(training.problem.start)
+        distance = training.feature_distance(training.problem.start)
+    except UserError as error:
+        raise UserError(f"no finite start: {error}; start from another fibre file") from error
+    if not (np.all(np.isfinite(force)) and np.all(np.isfinite(distance))):
+        raise UserError("no finite start: the simulated force is not finite; start from another fibre file")

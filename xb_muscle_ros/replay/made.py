@@ -1,0 +1,61 @@
+"""Recordings made by a model: a trial with the force that a fibre would have shown, and noise like the real."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from xb_muscle_ros.measurement.recording import given_calcium, given_length, recorded_force
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.trials.trial import Array, Trial
+
+# Of a real recording at 1 kHz (rat soleus fibre 18Dec2017a): SD 0.03 to 0.14 % F0, lag-1 autocorrelation 0.91 to 0.98.
+NOISE_SD_F0 = 1e-3
+NOISE_MEMORY = 0.95
+
+
+def coloured_noise(random: np.random.Generator, n: int, sd: float = NOISE_SD_F0, memory: float = NOISE_MEMORY) -> Array:
+    """First-order autoregressive noise.
+
+    Args:
+        random: where it comes from.
+        n: samples.
+        sd: standard deviation, F0.
+        memory: correlation of one sample with the next, 0 up to below 1.
+    """
+    fresh = random.normal(size=n) * sd * np.sqrt(1.0 - memory**2)
+    fresh[0] = random.normal() * sd
+    out = np.empty(n)
+    last = 0.0
+    for k in range(n):
+        last = memory * last + float(fresh[k])
+        out[k] = last
+    return out
+
+
+def made(
+    muscle: Muscle, trial: Trial, random: np.random.Generator, noise_sd_f0: float = NOISE_SD_F0, **faults: float
+) -> Trial:
+    """A trial with measured force that a fibre and a faulty measurement made.
+
+    Args:
+        muscle: the fibre.
+        trial: what it is said to be given.
+        random: of the noise.
+        noise_sd_f0: standard deviation of the noise, F0.
+        faults: values by name of `measurement.faults.FAULTS`.
+
+    Raises:
+        UserError, StateViolation: see `simulate_trial`.
+    """
+    length = 1.0 + given_length(trial.length_change_l0, faults)
+    given = replace(
+        trial,
+        length_m=length * trial.facts.reference_length_m,
+        calcium_um=given_calcium(trial.calcium_um, faults),
+    )
+    force = simulate_trial(muscle, given).force_n / trial.facts.f0_n
+    recorded = recorded_force(trial.time_s, force, faults) + coloured_noise(random, force.size, noise_sd_f0)
+    return replace(trial, force_time_s=trial.time_s, force_n=recorded * trial.facts.f0_n)
