@@ -12,6 +12,7 @@ import importlib.util
 import os
 import sys
 import tempfile
+from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
@@ -27,7 +28,7 @@ _SOURCES = ("mechanisms", "distribution", "models", "stepping")
 @functools.lru_cache(maxsize=1)
 def _fingerprint() -> str:
     """Hash of all source that generated code depends on, and of what compiles it."""
-    digest = hashlib.sha256(f"{sys.version} numba {numba.__version__}".encode())
+    digest = hashlib.sha256(f"{sys.version} numba {numba.__version__} sympy {version('sympy')}".encode())
     for folder in _SOURCES:
         for file in sorted((_PACKAGE / folder).rglob("*.py")):
             digest.update(str(file.relative_to(_PACKAGE)).encode())
