@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.calibration import calibrated_force
 from xb_muscle_ros.fit.coordinates import Choice, fault_coordinates, parameter_coordinates, population_choices
 from xb_muscle_ros.fit.data import fit_trials
-from xb_muscle_ros.fit.features import F0_ANCHOR, Feature, simulated
+from xb_muscle_ros.fit.features import F0_ANCHOR, Feature, measured, simulated
 from xb_muscle_ros.fit.noise import FIRST, autocovariance, scale_of
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.solve import Objective, descend
@@ -216,3 +218,23 @@ def test_calibration_finds_the_shift_of_a_held_out_solution(truth: Fibre, made_t
     assert found is not None
     assert found[1] == pytest.approx(-0.05, abs=5e-3)
     assert np.sqrt(np.mean((found[0] - prepared[0].measured_f0) ** 2)) < 3e-3
+
+
+def test_stretches_of_a_fibre_that_has_run_down_are_left_out(tmp_path: Path) -> None:
+    def table(worst: float) -> dict[str, object]:
+        cells = {
+            "isometric_force": [[[1.0, 1.0]]],
+            "srs_conditioning": [[[None, 40.0]]],
+            "srs_test": [[[40.0, worst]]],
+        }
+        return {"pCa": [4.5], "recovery_s": [0.1], "amplitude_L0": [0.0, 0.0383], "fibres": {"a": cells}}
+
+    path = tmp_path / "table.json"
+    for worst, kept in ((30.0, 2), (-60.0, 0), (118.0, 0)):
+        path.write_text(json.dumps(table(worst)))
+        found = measured(path, "a")
+        assert sum(f.kind == "srs_test" for f in found) == kept
+        assert sum(f.kind == "isometric_force" for f in found) == 1
+    with pytest.raises(UserError, match="'b' is not among a"):
+        measured(path, "b")
+    assert all(f.kind == "isometric_force" for f in measured(path, "a", stiffness=False))

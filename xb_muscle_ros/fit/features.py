@@ -58,6 +58,8 @@ class Feature:
 _FORCE_SD_F0, _SRS_SHARE, _SRS_SD = 0.02, 0.05, 0.5
 # Stretches in one solution share its error and the model's: all of them together tell as much as so many would alone.
 _INDEPENDENT_PER_SOLUTION = 4
+# Below it, F0/L0, a stretch's stiffness is mostly noise, and says nothing of the fibre's health.
+_ACTIVE_SRS = 5.0
 
 # A fibre's forces are divided by its isometric force at pCa 4.5: a model that is to give forces in F0 gives 1 there.
 F0_ANCHOR = Feature("isometric_force", 4.5, 0.0, 0.0, 1.0, 0.02)
@@ -98,7 +100,8 @@ def measured(path: Path, fibre: str, stiffness: bool = True) -> tuple[Feature, .
     """Features of one fibre from a table of measurements such as ``empirical_srs.json``.
 
     Isometric force is taken once for each pCa (mean over trials), stiffness of conditioning stretches as well, that of
-    test stretches from every cell; those of one pCa count as four independent ones.
+    test stretches from every cell; those of one pCa count as four independent ones. The test stretches of a solution
+    in which the fibre has run down are left out.
 
     Args:
         path: JSON with ``pCa``, ``recovery_s``, ``amplitude_L0``, ``fibres``: quantity -> [pCa][recovery][amplitude].
@@ -128,11 +131,24 @@ def measured(path: Path, fibre: str, stiffness: bool = True) -> tuple[Feature, .
             for k, amplitude in enumerate(tables["amplitude_L0"])
             if stiffness and cells["srs_test"][i][j][k] is not None
         ]
+        if _broken([f.value for f in stretches], np.array(cells["srs_conditioning"][i], dtype=np.float64)):
+            stretches = []
         shared = max(1.0, len(stretches) / _INDEPENDENT_PER_SOLUTION) ** 0.5
         found += [replace(f, sd=f.sd * shared) for f in stretches]
     if not found:
         raise UserError(f"features {path}: nothing was measured on fibre '{fibre}'")
     return tuple(found)
+
+
+def _broken(tests: Sequence[float], unconditioned: Array) -> bool:
+    """Whether a solution's test stretches are those of a fibre that has run down: far below zero, or twice too stiff.
+
+    Fibre 13Dec2017a at pCa 4.5 is one: -60 to 118 F0/L0 where unconditioned stretches had 41 to 47.
+    """
+    if not np.isfinite(unconditioned).any() or not len(tests):
+        return False
+    reference = float(np.nanmean(unconditioned))
+    return reference > _ACTIVE_SRS and not -0.1 * reference < min(tests) <= max(tests) < 2.0 * reference
 
 
 def _feature(kind: str, pca: float, recovery_s: float, amplitude_l0: float, value: float) -> Feature:

@@ -1,0 +1,252 @@
+"""One bag through the models, and what a run keeps of many."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from xb_muscle_ros.evaluate import bags
+from xb_muscle_ros.evaluate.more_scores import enhancement_pairs, force_pca_of_trials
+from xb_muscle_ros.evaluate.trials import Trials, duplicates, srs_table
+from xb_muscle_ros.trials.trial import Phase, Trial
+
+Maker = Callable[..., Path]
+
+
+def found_in(*paths: Path, models: tuple[str, ...] | None = ("3state_coop",), **options: Any) -> list[dict[str, Any]]:
+    made = bags.tasks(list(paths), None, models, None, **options)
+    assert json.loads(json.dumps(made)) == made
+    return [json.loads(json.dumps(bags.evaluate_bag(task), allow_nan=False)) for task in made]
+
+
+def test_a_constant_error_is_the_rmsd_of_every_window(make: Maker) -> None:
+    (found,) = found_in(make(error_f0=0.02))
+    assert found["models"]["3state_coop"]["rmsd_f0"] == pytest.approx(
+        {"whole": 0.02, "conditioning": 0.02, "test": 0.02}, abs=1e-9
+    )
+    model, measured = found["models"]["3state_coop"], found["measured"]
+    assert measured["srs_test"] == pytest.approx(model["srs_test"])
+    assert measured["isometric_f0"] == pytest.approx(model["isometric_f0"] + 0.02)
+    assert measured["k_tr"] is None
+
+
+def test_reference_trials_have_no_conditioning_stretch(make: Maker) -> None:
+    (found,) = found_in(make(amplitude_l0=0.0))
+    assert found["models"]["3state_coop"]["rmsd_f0"]["conditioning"] is None
+    assert found["measured"]["srs_conditioning"] is None
+    assert found["measured"]["srs_test"] > 0.0
+
+
+def test_models_without_a_set_are_named(make: Maker) -> None:
+    (found,) = found_in(make(), models=("2state_coop", "2state"))
+    assert (list(found["models"]), found["missing"]) == (["2state"], ["2state_coop"])
+
+
+def test_all_sets_of_the_fibre_file_without_a_choice(make: Maker) -> None:
+    (found,) = found_in(make(), models=None)
+    assert set(found["models"]) == {"hill_se", "2state", "3state_coop", "3state_coop_v3", "4state_coop"}
+
+
+def test_measured_only_needs_no_fibre_file(make: Maker, recorded: Callable[..., Trial]) -> None:
+    trial = recorded()
+    path = make(replace(trial, facts=replace(trial.facts, fibre="nobody")))
+    assert found_in(path, measured_only=True)[0]["models"] == {}
+    (found,) = found_in(path)
+    assert found["problem"] == f"bag {path}: " + found["problem"].partition(": ")[2]
+    assert "fibre 'nobody' is not known" in found["problem"]
+
+
+def test_a_bag_of_a_fibre_that_was_not_given(make: Maker, repo_root: Path) -> None:
+    path = make()
+    files = {"13Dec2017a": repo_root / "config" / "fibers" / "13Dec2017a.yaml"}
+    (task,) = bags.tasks([path], files, None, None)
+    assert (
+        "the bag's fibre is '18Dec2017a', the fibre files given are of 13Dec2017a" in bags.evaluate_bag(task)["problem"]
+    )
+
+
+def test_nan_in_a_bag_is_told_with_topic_and_time(make: Maker, recorded: Callable[..., Trial]) -> None:
+    path = make()
+    _poison(path)
+    (found,) = found_in(path)
+    assert found["problem"].startswith(f"bag {path}: /muscle/measured_force, message ")
+    assert "has the value nan; allowed are finite numbers" in found["problem"]
+
+
+def _poison(path: Path) -> None:
+    """Put a run of NaN into the stored forces of a bag: bytes of the effort, 8 at a time."""
+    import struct
+
+    from mcap.reader import make_reader
+    from mcap.writer import Writer
+
+    from xb_muscle_ros.trials import ros_types
+
+    (file,) = path.glob("*.mcap")
+    with file.open("rb") as stream:
+        reader = make_reader(stream)
+        entries = [(s, c, m) for s, c, m in reader.iter_messages()]
+        metadata = list(reader.iter_metadata())
+    with file.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2", "test")
+        schemas: dict[int, int] = {}
+        channels: dict[int, int] = {}
+        count = 0
+        for schema, channel, message in entries:
+            assert schema is not None
+            if schema.id not in schemas:
+                schemas[schema.id] = writer.register_schema(schema.name, schema.encoding, schema.data)
+            if channel.id not in channels:
+                channels[channel.id] = writer.register_channel(
+                    channel.topic, channel.message_encoding, schemas[schema.id], dict(channel.metadata)
+                )
+            data = message.data
+            if channel.topic == ros_types.MEASURED_FORCE:
+                count += 1
+                if 50 <= count < 60:
+                    data = data[:-8] + struct.pack("<d", float("nan"))
+            writer.add_message(channels[channel.id], message.log_time, data, message.publish_time, message.sequence)
+        for record in metadata:
+            writer.add_metadata(record.name, record.metadata)
+        writer.finish()
+
+
+def test_a_mended_bag_is_another_task(make: Maker) -> None:
+    path = make(error_f0=0.02)
+    before = bags.tasks([path], None, None, None)
+    assert bags.tasks([path], None, None, None) == before
+    make(error_f0=0.03)
+    assert bags.tasks([path], None, None, None) != before
+
+
+def kept(found: list[dict[str, Any]]) -> Trials:
+    trials = Trials(len(found))
+    for index in reversed(range(len(found))):  # results come in any order
+        trials.add(index, found[index])
+    return trials
+
+
+def test_a_table_of_srs_is_made_of_trials(make: Maker) -> None:
+    found = found_in(make(), make(amplitude_l0=0.0), make(pca=6.3), make(error_f0=0.1, recovery_s=0.1))
+    trials = kept(found)
+    table = srs_table(trials, None, "measured")
+    assert table is not None
+    assert table.pca.tolist() == [6.1, 6.3]
+    assert table.recovery_s.tolist() == [0.05, 0.1]
+    assert table.amplitude_l0.tolist() == [0.0, 0.0383]
+    test = table.fibres["18Dec2017a"].test
+    assert test[0, 0, 1] == found[0]["measured"]["srs_test"]
+    assert test[0, 1, 1] == found[3]["measured"]["srs_test"]
+    assert np.isnan(test[1, 1]).all()
+    assert srs_table(trials, "3state_coop", "m") is not None
+
+
+def test_repeats_of_a_condition_are_averaged(make: Maker, recorded: Callable[..., Trial]) -> None:
+    other = recorded(model="2state")
+    found = found_in(make(), make(replace(other, facts=replace(other.facts, trial="again"))))
+    table = srs_table(kept(found), None, "measured")
+    assert table is not None
+    expected = 0.5 * (found[0]["measured"]["srs_test"] + found[1]["measured"]["srs_test"])
+    assert table.fibres["18Dec2017a"].test[0, 0, 0] == pytest.approx(expected)
+
+
+def test_too_many_levels_leave_the_common_conditions() -> None:
+    trials = Trials(101)
+    for i in range(101):
+        trials.fibre[i] = "f"
+        trials._code[i] = trials._codes.setdefault("f", 0)
+        trials.pca[i], trials.recovery_s[i], trials.amplitude_l0[i] = 6.1, 0.1, 0.0383 if i == 100 else 0.01 + 1e-4 * i
+        trials.measured["srs_test"][i] = float(i)
+    table = srs_table(trials, None, "measured")
+    assert table is not None
+    assert table.amplitude_l0.tolist() == [0.0, 0.0012, 0.0038, 0.0121, 0.0383]
+    assert table.fibres["f"].test[0, 0, 4] == 100.0
+
+
+def test_duplicates_are_named(make: Maker, recorded: Callable[..., Trial]) -> None:
+    trial = recorded()
+    same_name = make(recorded(error_f0=0.05), name="b_same_name")
+    same_samples = make(replace(trial, facts=replace(trial.facts, trial="other")), name="c_same_samples")
+    paths = [make(trial, name="a"), same_name, same_samples]
+    lines = dict(duplicates(kept(found_in(*paths))))
+    assert f"bag {same_name}: trial {trial.facts.trial} of fibre 18Dec2017a is in {paths[0]} already" in lines[1]
+    assert lines[2] == f"bag {same_samples} holds the same samples as {paths[0]}; give every trial once"
+
+
+def test_force_pca_needs_five_levels(make: Maker) -> None:
+    short = kept(found_in(*(make(pca=pca) for pca in (4.5, 6.1, 6.3, 9.0))))
+    assert force_pca_of_trials(short) == []
+    rows = force_pca_of_trials(kept(found_in(*(make(pca=pca) for pca in (4.5, 6.1, 6.3, 6.6, 9.0)))))
+    by = {row["of"]: row for row in rows}
+    assert set(by) == {"measured", "3state_coop"}
+    assert by["measured"]["pca50"] == pytest.approx(by["3state_coop"]["pca50"], abs=1e-3)
+    assert by["measured"]["passive_f0"] == pytest.approx(by["3state_coop"]["passive_f0"] + 0.02, abs=1e-3)
+
+
+def test_enhancement_of_a_made_pair(make: Maker, held: Callable[..., Trial]) -> None:
+    paths = [
+        make(held(0.1, 0.8, "iso_long")),
+        make(held(0.0, 0.9, "iso_short")),
+        make(held(0.1, 1.0, "ramp", stretched_s=2.0)),
+        make(held(0.1, 0.85, "iso_long_again")),
+    ]
+    trials = kept(found_in(*paths, measured_only=True))
+    (pair,) = enhancement_pairs(trials)
+    # The isometric trial at the final length, and the one before the stretch rather than the one after it.
+    assert [shape["trial"] for shape in pair] == ["ramp", "iso_long"]
+    shared = bags.tasks([paths[0]], None, None, None, measured_only=True)[0]
+    found = bags.evaluate_enhancement(bags.enhancement_task(*pair, shared))
+    assert found["at_s"] == pytest.approx(5.0)
+    assert found["measured"] == pytest.approx(
+        {"stretched_f0": 1.0, "isometric_f0": 0.8, "enhancement_f0": 0.2, "relative": 0.25}
+    )
+
+
+def test_no_enhancement_once_activation_has_ended(make: Maker, held: Callable[..., Trial]) -> None:
+    ended = {"calcium_time_s": np.array([0.0, 1.0, 4.0]), "calcium_um": np.array([0.05, 8.0, 0.05])}
+    paths = [
+        make(replace(held(0.1, 0.8, "iso"), **ended)),
+        make(replace(held(0.1, 1.0, "ramp", stretched_s=2.0), **ended)),
+    ]
+    trials = kept(found_in(*paths, measured_only=True))
+    (pair,) = enhancement_pairs(trials)
+    shared = bags.tasks([paths[0]], None, None, None, measured_only=True)[0]
+    assert bags.evaluate_enhancement(bags.enhancement_task(*pair, shared))["measured"] is None
+
+
+def test_clocks_are_set_by_activation(make: Maker, held: Callable[..., Trial]) -> None:
+    """An isometric trial activated a second later is read a second later."""
+    iso = held(0.1, 0.8, "iso")
+    late = replace(iso, calcium_time_s=np.array([0.0, 2.0]), force_n=iso.force_time_s)
+    paths = [make(late), make(held(0.1, 1.0, "ramp", stretched_s=1.9))]
+    (pair,) = enhancement_pairs(kept(found_in(*paths, measured_only=True)))
+    shared = bags.tasks([paths[0]], None, None, None, measured_only=True)[0]
+    found = bags.evaluate_enhancement(bags.enhancement_task(*pair, shared))
+    assert found["measured"]["isometric_f0"] == pytest.approx(4.9 + 1.0)
+
+
+def test_a_recorded_release_gives_k_tr(make: Maker, recorded: Callable[..., Trial]) -> None:
+    trial = recorded(amplitude_l0=0.0)
+    time_s = np.arange(4001) * 1e-3
+    phases = (Phase("isometric", 0.0, 1.0), Phase("release", 1.0, 1.001), Phase("stretch", 1.02, 1.021))
+    length = np.where((time_s > 1.0) & (time_s < 1.0205), 0.8, 1.0)
+    force = np.where(time_s < 1.0, 0.9, np.where(time_s < 1.0205, 0.0, 0.9 - 0.7 * np.exp(-4.0 * (time_s - 1.0205))))
+    made = replace(
+        trial,
+        facts=replace(trial.facts, amplitude_l0=None, recovery_s=None, phases=phases, pca=4.5),
+        time_s=time_s,
+        length_m=length,
+        calcium_um=np.array([10.0**1.5]),
+        force_time_s=time_s,
+        force_n=force,
+    )
+    (found,) = found_in(make(made))
+    assert found["measured"]["k_tr"]["k_per_s"] == pytest.approx(4.0, rel=1e-4)
+    assert found["models"]["3state_coop"]["k_tr"]["k_per_s"] > 0.0

@@ -1,0 +1,161 @@
+"""The paper's grid of conditions through a model: SRS of every cell, isometric force and k_tr.
+
+Trials of one fibre and pCa differ only in what follows the isometric phase, and test stretches only in what went
+before their onset. So a fibre settles once for each pCa, stretches and shortens once for each amplitude, rests once
+through all recovery times, and takes the ten milliseconds of test stretch that its SRS needs: 4,410 trials take about
+a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.evaluate.sets import ModelSet, fibre_to_task, muscle_of_task
+from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable, place
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0
+from xb_muscle_ros.scores.redevelopment import redevelopment
+from xb_muscle_ros.scores.stiffness import WINDOW_S
+from xb_muscle_ros.trials.protocol import SPEED_L0_PER_S
+from xb_muscle_ros.trials.trial import Array
+
+AMPLITUDES_L0 = (0.0, 0.0012, 0.0038, 0.0121, 0.0216, 0.0288, 0.0383, 0.0532, 0.0682)
+RECOVERIES_S = (0.001, 0.01, 0.05, 0.1, 0.2, 0.316, 0.5, 1.0, 3.16, 10.0)
+PCAS = (4.5, 6.1, 6.2, 6.3, 6.4, 6.6, 9.0)
+# Samples that a stretch's SRS is fitted to: 1 kHz, the ten after onset.
+_SAMPLE_S = np.arange(1, 11) * (WINDOW_S / 10.0)
+# Release and restretch as in k_tr recordings of rat soleus: a fifth of the length, for 20 ms.
+_RELEASE_L0, _RELEASE_RAMP_S, _RELEASED_S, _REDEVELOP_S = 0.20, 0.001, 0.020, 5.0
+
+Task = dict[str, Any]
+
+
+def tasks(
+    sets: Iterable[ModelSet],
+    pcas: Sequence[float] = PCAS,
+    recoveries_s: Sequence[float] = RECOVERIES_S,
+    amplitudes_l0: Sequence[float] = AMPLITUDES_L0,
+    settle_s: float | None = None,
+) -> list[Task]:
+    """One task for each set, fibre and pCa, in this order.
+
+    Args:
+        sets: what to simulate.
+        pcas, recoveries_s, amplitudes_l0: axes of the grid; recoveries ascending, s; amplitudes in L0.
+        settle_s: isometric time from rest before the protocol, s; None: until at rest.
+    """
+    return [
+        {
+            "fibre": fibre_to_task(fibre),
+            "pca": pca,
+            "recoveries_s": list(recoveries_s),
+            "amplitudes_l0": list(amplitudes_l0),
+            "settle_s": settle_s,
+        }
+        for each in sets
+        for fibre in each.fibres.values()
+        for pca in pcas
+    ]
+
+
+def simulate(task: Mapping[str, Any]) -> dict[str, Any]:
+    """Cells of one fibre and pCa.
+
+    Args:
+        task: of `tasks`.
+
+    Returns:
+        ``srs_test`` (recovery x amplitude) and ``srs_conditioning``, F0/L0; ``isometric_f0``; ``k_tr``: rate and
+        standard error, 1/s, or None where force does not redevelop; ``k_tr_problem``: why the release cannot be
+        simulated, or None.
+
+    Raises:
+        UserError, StateViolation: see `Muscle.settle` and `Muscle.step`.
+    """
+    muscle = muscle_of_task(task["fibre"])
+    calcium = 10.0 ** (6.0 - task["pca"])
+    settled = muscle.settle(0.0, calcium, task["settle_s"])
+    recoveries = np.array(task["recoveries_s"])
+    srs_test = np.empty((recoveries.size, len(task["amplitudes_l0"])))
+    for j, amplitude in enumerate(task["amplitudes_l0"]):
+        state = stretched_and_back(muscle, settled, amplitude, calcium) if amplitude else settled
+        for i, recovered in enumerate(_followed(muscle, state, recoveries, 0.0 * recoveries, calcium)):
+            srs_test[i, j] = onset_stiffness(muscle, recovered, calcium)
+    k_tr, problem = None, None
+    try:
+        k_tr = _redeveloped(muscle, settled, calcium)
+    except UserError as error:
+        # A hundred times as fast as the protocol: not every method follows, and nothing else depends on it.
+        problem = str(error)
+    return {
+        "srs_test": srs_test.tolist(),
+        "srs_conditioning": onset_stiffness(muscle, settled, calcium),
+        "isometric_f0": muscle.outputs(settled).force_f0,
+        "k_tr": k_tr,
+        "k_tr_problem": problem,
+    }
+
+
+def table(label: str, fibres: Sequence[Fibre], made: Sequence[Task], results: Sequence[Mapping[str, Any]]) -> SrsTable:
+    """Results of one set's tasks as a table.
+
+    Args:
+        label: of the table.
+        fibres: in the order of the tasks.
+        made, results: tasks of these fibres, and what `simulate` made of them.
+    """
+    pcas = list(dict.fromkeys(task["pca"] for task in made))
+    recoveries, amplitudes = np.array(made[0]["recoveries_s"]), np.array(made[0]["amplitudes_l0"])
+    shape = (len(pcas), recoveries.size, amplitudes.size)
+    column = place(amplitudes, COMMON_AMPLITUDE_L0)
+    held = {}
+    for k, fibre in enumerate(fibres):
+        cells = results[k * len(pcas) : (k + 1) * len(pcas)]
+        conditioning, isometric = np.full(shape, np.nan), np.full(shape, np.nan)
+        isometric[:] = np.array([cell["isometric_f0"] for cell in cells])[:, None, None]
+        if column is not None:
+            conditioning[:, :, column] = np.array([cell["srs_conditioning"] for cell in cells])[:, None]
+        held[fibre.name] = FibreSrs(np.array([cell["srs_test"] for cell in cells]), conditioning, isometric)
+    return SrsTable(label, np.array(pcas), recoveries, amplitudes, held)
+
+
+def _followed(muscle: Muscle, state: Array, time_s: Array, length_l0: Array, calcium: float) -> Array:
+    """States at times from now, straight from one length to the next; every time is a corner, where steps land."""
+    corner_s = np.concatenate([[0.0], time_s])
+    lengths = np.concatenate([state[-3:-2], length_l0])
+    return muscle.follow(state, corner_s, lengths, np.full(corner_s.size, calcium), time_s)
+
+
+def waited(muscle: Muscle, state: Array, duration_s: float, calcium: float) -> Array:
+    """State after holding the length."""
+    after: Array = _followed(muscle, state, np.array([duration_s]), state[-3:-2], calcium)[-1]
+    return after
+
+
+def stretched_and_back(muscle: Muscle, state: Array, amplitude_l0: float, calcium: float) -> Array:
+    """State after a stretch of an amplitude (L0) and the way back, at the paper's speed."""
+    ramp = amplitude_l0 / SPEED_L0_PER_S
+    after: Array = _followed(muscle, state, np.array([ramp, 2.0 * ramp]), np.array([amplitude_l0, 0.0]), calcium)[-1]
+    return after
+
+
+def onset_stiffness(muscle: Muscle, state: Array, calcium: float) -> float:
+    """SRS of a stretch that begins at this state, F0/L0."""
+    lengths = state[-3] + SPEED_L0_PER_S * _SAMPLE_S
+    force = muscle.outputs_of(_followed(muscle, state, _SAMPLE_S, lengths, calcium))["force_f0"]
+    return float(np.polyfit(lengths, force, 1)[0])
+
+
+def _redeveloped(muscle: Muscle, state: Array, calcium: float) -> dict[str, float] | None:
+    corner_s = np.cumsum([_RELEASE_RAMP_S, _RELEASED_S, _RELEASE_RAMP_S])
+    away = _followed(muscle, state, corner_s, np.array([-_RELEASE_L0, -_RELEASE_L0, 0.0]), calcium)[-1]
+    time_s = np.arange(1, round(_REDEVELOP_S * 1e3) + 1) * 1e-3
+    states = _followed(muscle, away, time_s, 0.0 * time_s, calcium)
+    force = muscle.outputs_of(states)["force_f0"]
+    found = redevelopment(time_s, force, 0.0, _REDEVELOP_S)
+    return None if found is None else {"k_per_s": found.k_per_s, "se_per_s": found.se_per_s}

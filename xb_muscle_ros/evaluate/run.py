@@ -1,0 +1,305 @@
+"""A whole evaluation: recordings, the paper's grid, or both; sections, tables, figures, files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.bench.golden import METHODS, SETS
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.evaluate import bags as bag_tasks
+from xb_muscle_ros.evaluate import grid, more_scores, sections
+from xb_muscle_ros.evaluate.paper import Source, compare, readings_table
+from xb_muscle_ros.evaluate.report import write_up
+from xb_muscle_ros.evaluate.sets import ModelSet, gather
+from xb_muscle_ros.evaluate.srs_scores import ALL_READINGS, READINGS
+from xb_muscle_ros.evaluate.srs_table import SrsTable, read_table, read_tables
+from xb_muscle_ros.evaluate.tables_text import write_csv
+from xb_muscle_ros.evaluate.trials import Trials, duplicates, srs_table
+from xb_muscle_ros.files import write_text
+from xb_muscle_ros.models.fibre_file import fibre_folders, find_fibre_file, load_fibre
+from xb_muscle_ros.scores.enhancement import AFTER_S
+from xb_muscle_ros.trials.bags import find_bags
+from xb_muscle_ros.work import Options, run, stream
+
+JOURNAL = "evaluate.journal"
+_OURS, _GOLDEN = "ours", "released output"
+_MAXIMAL_PCA = 4.5
+
+
+@dataclass(frozen=True)
+class Request:
+    """What to evaluate.
+
+    Attributes:
+        bags: bag folders, ``.mcap`` files or folders of bags; may be empty where `empirical` is given.
+        fibres: fibre files or names; empty: a bag's own, or all of the package's that were measured.
+        models: parameter sets; None for all that the fibre files have.
+        method: representation of strain; None for the fibre file's.
+        settle_s: isometric time before a trial, s; None until at rest.
+        measured_only: no models.
+        skip_bad: leave recordings that cannot be used out, in place of refusing all.
+        empirical: table of measured SRS; its presence asks for the paper's grid.
+        golden: the authors' released output.
+        out: folder for results; the journal lies there too.
+        work: where to compute.
+    """
+
+    bags: tuple[str, ...]
+    fibres: tuple[str, ...]
+    models: tuple[str, ...] | None
+    method: str | None
+    settle_s: float | None
+    measured_only: bool
+    skip_bad: bool
+    empirical: Path | None
+    golden: Path | None
+    out: Path
+    work: Options
+
+
+@dataclass
+class Results:
+    """What an evaluation found.
+
+    Attributes:
+        sections: content of ``evaluate.json``.
+        warnings: lines for the user.
+        trials: of the recordings; None without.
+        models: parameter sets, simplest first.
+        tables: SRS of models on the same trials as `data`, by set.
+        data: measured SRS; None where the recordings have none.
+    """
+
+    sections: dict[str, Any]
+    warnings: list[str] = field(default_factory=list)
+    trials: Trials | None = None
+    models: list[ModelSet] = field(default_factory=list)
+    tables: dict[str, SrsTable] = field(default_factory=dict)
+    data: SrsTable | None = None
+
+
+def evaluate(request: Request, tell: Callable[[str], None] = lambda line: None) -> Results:
+    """Compute everything; nothing but the journal is written.
+
+    Args:
+        request: what to do.
+        tell: called with each line on a recording that cannot be used.
+
+    Raises:
+        UserError: a file, fibre, model or recording cannot be used; `work` cannot be done.
+        StateViolation: see `Muscle.step`.
+    """
+    # Tables are read first: a fault in them shows before hours of work, and before the folder is made.
+    data = read_table(request.empirical, "measured") if request.empirical is not None else None
+    golden = read_tables(request.golden, _GOLDEN) if request.golden is not None else {}
+    results = Results({"sets": [], "force_pca": [], "k_tr": [], "residual_force_enhancement": []})
+    if request.bags:
+        _recordings(request, results, tell)
+    if data is not None:
+        _paper(request, results, data, golden)
+    return results
+
+
+def write(request: Request, results: Results) -> list[Path]:
+    """Write all files of the results; returns what to look at."""
+    return [*write_tables(request.out, results), *draw_figures(request.out, results)]
+
+
+def write_tables(out: Path, results: Results) -> list[Path]:
+    """Write ``evaluate.json``, ``evaluate.md`` and the CSV files."""
+    found = results.sections
+    write_text(out / "evaluate.json", json.dumps(found, indent=1, allow_nan=False) + "\n")
+    write_text(out / "evaluate.md", write_up(found))
+    made = ["evaluate.json", "evaluate.md"]
+
+    def table(name: str, rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> None:
+        write_csv(out / name, rows, columns)
+        made.append(name)
+
+    if results.trials is not None:
+        table("trials.csv", sections.trial_rows(results.trials), sections.TRIAL_COLUMNS)
+    if "force_rmsd" in found and found["force_rmsd"]["overall"]:
+        table("force_rmsd.csv", sections.force_rows(found["force_rmsd"]), sections.FORCE_COLUMNS)
+    if results.data is not None:
+        table("relative_srs.csv", sections.relative_rows(results.tables, results.data), sections.RELATIVE_COLUMNS)
+        cells = {more_scores.MEASURED: results.data, **results.tables}
+        table("srs_cells.csv", sections.cell_rows(cells), sections.CELL_COLUMNS)
+    if "paper" in found:
+        table("srs_rmsd.csv", found["paper"]["readings"], list(found["paper"]["readings"][0]))
+    return [out / name for name in made]
+
+
+def draw_figures(out: Path, results: Results) -> list[Path]:
+    """Draw what there is to draw; PNG, and PDF beside it."""
+    from xb_muscle_ros.figures.evaluate_force import draw_force
+    from xb_muscle_ros.figures.evaluate_srs import draw_srs
+    from xb_muscle_ros.figures.evaluate_surfaces import draw_surfaces
+
+    made = []
+    force = results.sections.get("force_rmsd", {})
+    if force.get("overall"):
+        made.append(out / "force_rmsd.png")
+        draw_force(made[-1], force)
+    if results.data is not None and results.tables:
+        titles = {each.name: each.title for each in results.models}
+        made.append(out / "relative_srs.png")
+        draw_srs(made[-1], results.data, results.tables, titles, results.sections["srs"])
+        surfaces = out / "srs_surfaces.png"
+        made += [surfaces] if draw_surfaces(surfaces, results.data, results.tables, titles) else []
+    return made
+
+
+def _work(request: Request, label: str) -> Options:
+    return replace(request.work, journal=request.out / JOURNAL, label=label)
+
+
+def _recordings(request: Request, results: Results, tell: Callable[[str], None]) -> None:
+    found = find_bags(request.bags)
+    files = _fibre_files(request.fibres)
+    made = bag_tasks.tasks(
+        found, files, request.models, request.method, request.settle_s, measured_only=request.measured_only
+    )
+    trials = results.trials = Trials(len(made))
+    for index, one in stream(bag_tasks.evaluate_bag, made, _work(request, "recordings")):
+        trials.add(index, one)
+    _settle_problems(request, trials, tell)
+    results.warnings += trials.warnings
+    named = [name if files is None else files[name] for name in trials.fibres]
+    results.models = [] if request.measured_only else gather(named, request.models, request.method)
+    found_sections = results.sections
+    found_sections["sets"] = sections.sets_section(results.models)
+    found_sections["trials"] = {
+        "used": int(np.count_nonzero(trials.good)),
+        "fibres": trials.fibres,
+        "left_out": [trials.problems[bag] for bag in sorted(trials.problems)],
+        "missing": {name: sorted(fibres) for name, fibres in sorted(trials.missing.items())},
+    }
+    found_sections["force_rmsd"] = sections.force_section(trials)
+    found_sections["force_pca"] += more_scores.force_pca_of_trials(trials)
+    found_sections["k_tr"] += more_scores.k_tr_rows(trials)
+    _enhancement(request, results, made[0])
+    data = srs_table(trials, None, more_scores.MEASURED)
+    if data is not None:
+        results.data = data
+        for each in results.models:
+            table = srs_table(trials, each.name, each.title) if each.name in trials.models else None
+            if table is not None:
+                results.tables[each.name] = table
+        found_sections["srs"] = sections.srs_section(results.tables, data, results.models)
+
+
+def _fibre_files(given: Sequence[str]) -> dict[str, Path] | None:
+    """Fibre files by the fibre's name; None where none are given."""
+    files: dict[str, Path] = {}
+    for name in given:
+        path = find_fibre_file(name)
+        fibre = load_fibre(path).name
+        if fibre in files:
+            raise UserError(f"fibre {fibre} is given twice, by {files[fibre]} and {path}; give each once")
+        files[fibre] = path
+    return files or None
+
+
+def _settle_problems(request: Request, trials: Trials, tell: Callable[[str], None]) -> None:
+    for index, problem in list(duplicates(trials)):
+        trials.refuse(index, problem)
+    problems = [trials.problems[bag] for bag in sorted(trials.problems)]
+    if problems and not (request.skip_bad and np.any(trials.good)):
+        if len(problems) == 1:
+            raise UserError(problems[0])
+        for problem in problems:
+            tell(problem)
+        raise UserError(
+            f"{len(problems)} of {len(trials.bag)} bags cannot be used; mend them, or leave them out with --skip-bad"
+        )
+    for problem in problems:
+        tell(f"left out: {problem}")
+
+
+def _enhancement(request: Request, results: Results, shared: dict[str, Any]) -> None:
+    assert results.trials is not None
+    pairs = more_scores.enhancement_pairs(results.trials)
+    if not pairs:
+        return
+    made = [bag_tasks.enhancement_task(a, b, shared) for a, b in pairs]
+    found = run(bag_tasks.evaluate_enhancement, made, _work(request, "force enhancement"))
+    rows = more_scores.enhancement_rows(pairs, [dict(one) for one in found])
+    results.sections["residual_force_enhancement"] += rows
+    results.sections["enhancement_after_s"] = AFTER_S
+
+
+def _paper(request: Request, results: Results, data: SrsTable, golden: Mapping[str, SrsTable]) -> None:
+    fibres = list(request.fibres) or _package_fibres(data)
+    models = gather(fibres, request.models, request.method)
+    made = grid.tasks(models, settle_s=request.settle_s)
+    found = [dict(one) for one in run(grid.simulate, made, _work(request, "paper's grid"))]
+    tables: dict[str, SrsTable] = {}
+    k_tr: dict[str, list[float]] = {}
+    start = 0
+    for each in models:
+        end = start + len(each.fibres) * len(grid.PCAS)
+        tables[each.name] = grid.table(each.title, list(each.fibres.values()), made[start:end], found[start:end])
+        k_tr[each.name] = []
+        problems = [one["k_tr_problem"] for one in found[start:end] if one["k_tr_problem"]]
+        if problems:
+            told = f"{each.name}: k_tr is left out for {len(problems)} of {end - start} fibres and pCa"
+            results.warnings.append(f"{told}, the first because: {problems[0]}")
+        for task, one in zip(made[start:end], found[start:end], strict=True):
+            if one["k_tr"] is not None:
+                row = {"fibre": task["fibre"]["name"], "trial": "simulated release", "pca": task["pca"]}
+                results.sections["k_tr"].append({**row, "of": each.name, **one["k_tr"]})
+                if task["pca"] == _MAXIMAL_PCA:
+                    k_tr[each.name].append(one["k_tr"]["k_per_s"])
+        start = end
+    sources = [Source(_OURS, tables, k_tr), *_golden_sources(golden, models, tables)]
+    results.models, results.tables, results.data = models, tables, data
+    if "srs" in results.sections:
+        results.sections["srs_of_recordings"] = results.sections.pop("srs")
+    results.sections |= {
+        "sets": sections.sets_section(models),
+        "srs": sections.srs_section(tables, data, models),
+        "paper": {
+            "sources": [source.name for source in sources],
+            "readings_shown": list(READINGS),
+            "comparison": compare(sources, data, models),
+            "readings": readings_table(sources, data, models, ALL_READINGS),
+            "recordings": bool(request.bags),
+        },
+    }
+    for label, table in [(more_scores.MEASURED, data), *tables.items()]:
+        results.sections["force_pca"] += more_scores.force_pca_of_table(table, label)
+
+
+def _golden_sources(
+    golden: Mapping[str, SrsTable], models: Sequence[ModelSet], tables: Mapping[str, SrsTable]
+) -> list[Source]:
+    """The authors' output for the sets evaluated, and ours on the same fibres where theirs are fewer."""
+    theirs: dict[str, SrsTable] = {}
+    for each in models:
+        method = next(iter(each.fibres.values())).method
+        named = [name for name, of in SETS.items() if of == each.name and name in golden]
+        # The table made with the same method where there are several.
+        named.sort(key=lambda name: METHODS.get(name, "gaussian") != method)
+        if named:
+            theirs[each.name] = golden[named[0]].only(list(each.fibres))
+    ours = {name: tables[name].only(list(theirs[name].fibres)) for name in theirs}
+    fewer = any(len(ours[name].fibres) < len(tables[name].fibres) for name in theirs)
+    count = max((len(table.fibres) for table in theirs.values()), default=0)
+    sources = [Source(f"{_OURS}, {count} fibres", ours, {})] if fewer else []
+    return [*sources, Source(_GOLDEN, theirs, {})] if theirs else []
+
+
+def _package_fibres(data: SrsTable) -> list[str]:
+    known = {file.stem for folder in fibre_folders() for file in folder.glob("*.yaml")}
+    names = [name for name in data.fibres if name in known]
+    if not names:
+        raise UserError(
+            f"no fibre file for any of the measured fibres {', '.join(data.fibres)}; give fibre files with --fiber"
+        )
+    return names

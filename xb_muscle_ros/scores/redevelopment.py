@@ -1,0 +1,137 @@
+"""Rate of force redevelopment (k_tr) after a quick release and restretch (Brenner and Eisenberg 1986)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import curve_fit
+
+from xb_muscle_ros.trials.trial import Array
+
+# A manoeuvre: this much shorter, for at most this long, and back to within this share of the step.
+SMALLEST_RELEASE_L0 = 0.05
+LONGEST_RELEASE_S = 0.5
+_BACK = 0.1
+# The fit begins where force is lowest soon after the restretch, when heads that were still attached have let go, but
+# not before the slack is taken up and the motor has come to rest.
+_REST_S = 0.005
+_LOWEST_WITHIN_S = 0.1
+# What is over within the time waited is no redevelopment.
+_FASTEST_PER_S = 1.0 / _REST_S
+# Length that strays further from where it is held is a movement.
+_STILL_L0 = 0.01
+_SHORTEST_S = 0.2
+# Force that does not fall this far leaves nothing to redevelop.
+_SMALLEST_FALL = 0.1
+
+
+class Redevelopment(NamedTuple):
+    """F = F_end - (F_end - F_start)·exp(-k·t).
+
+    Attributes:
+        k_per_s: k_tr, 1/s.
+        se_per_s: its standard error, 1/s; widened for the correlation between successive residuals.
+        start_f0, end_f0: force at the begin of the fit and where it tends to, F0.
+        rmsd_f0: of the force from the curve, F0.
+        from_s, to_s: what was fitted, in the clock of the samples, s.
+    """
+
+    k_per_s: float
+    se_per_s: float
+    start_f0: float
+    end_f0: float
+    rmsd_f0: float
+    from_s: float
+    to_s: float
+
+
+def restretch_end(time_s: Array, length_l0: Array) -> float | None:
+    """Time (s) when a release by at least 5 % L0 that lasted 0.5 s at most was taken back; None where there is none.
+
+    Args:
+        time_s, length_l0: shape (n,), s and L0.
+    """
+    if length_l0.size < 3:
+        return None
+    shortest = int(np.argmin(length_l0))
+    before = float(np.median(length_l0[:shortest])) if shortest else float(length_l0[0])
+    step = before - float(length_l0[shortest])
+    if step < SMALLEST_RELEASE_L0:
+        return None
+    away = np.flatnonzero(length_l0 < before - _BACK * step)
+    if away.size != away[-1] - away[0] + 1 or away[-1] + 1 >= length_l0.size:
+        return None  # more than one release, or none back
+    end_s = float(time_s[away[-1] + 1])
+    return end_s if end_s - float(time_s[away[0]]) <= LONGEST_RELEASE_S else None
+
+
+def still_until(time_s: Array, length_l0: Array, restretched_s: float) -> float:
+    """Time (s) until which a fibre is held where the restretch left it.
+
+    Args:
+        time_s, length_l0: shape (n,), s and L0.
+        restretched_s: end of the restretch, s.
+    """
+    after = time_s >= restretched_s + _REST_S
+    if not np.any(after):
+        return float(time_s[-1])
+    t, length = time_s[after], length_l0[after]
+    moved = np.flatnonzero(np.abs(length - length[0]) > _STILL_L0)
+    return float(t[moved[0] - 1] if moved.size else t[-1])
+
+
+def redevelopment(time_s: Array, force_f0: Array, restretched_s: float, until_s: float) -> Redevelopment | None:
+    """Fit one exponential to the force after the restretch.
+
+    Args:
+        time_s, force_f0: shape (n,), s and F0.
+        restretched_s: end of the restretch, s.
+        until_s: end of the isometric time after it, s.
+
+    Returns:
+        None where force does not fall by a tenth of its end below it, does not rise again, is followed for less than
+        0.2 s, or rises faster than 200 1/s.
+    """
+    after = (time_s >= restretched_s + _REST_S - 5e-10) & (time_s <= until_s + 5e-10)
+    t, force = time_s[after], force_f0[after]
+    if t.size < 5 or t[-1] - t[0] < _SHORTEST_S:
+        return None
+    first = int(np.argmin(force[t <= t[0] + _LOWEST_WITHIN_S]))
+    t, force = t[first:], force[first:]
+    end = float(np.mean(force[t >= t[-1] - 0.1 * (t[-1] - t[0])]))
+    if t.size < 5 or not end - force[0] > _SMALLEST_FALL * abs(end):
+        return None
+    since = t - t[0]
+    half = float(since[int(np.argmax(force >= 0.5 * (force[0] + end)))])
+    start = (np.log(2.0) / max(half, float(since[1])), float(force[0]), end)
+    try:
+        found, covariance = curve_fit(_rise, since, force, p0=start)
+    except RuntimeError:
+        return None
+    residual = force - _rise(since, *found)
+    if not 0.0 < found[0] < _FASTEST_PER_S or not np.all(np.isfinite(covariance)):
+        return None
+    return Redevelopment(
+        k_per_s=float(found[0]),
+        se_per_s=float(np.sqrt(covariance[0, 0])) * _widening(residual),
+        start_f0=float(found[1]),
+        end_f0=float(found[2]),
+        rmsd_f0=float(np.sqrt(np.mean(residual**2))),
+        from_s=float(t[0]),
+        to_s=float(t[-1]),
+    )
+
+
+def _rise(since_s: Array, k: float, start: float, end: float) -> Array:
+    curve: Array = end - (end - start) * np.exp(-k * since_s)
+    return curve
+
+
+def _widening(residual: Array) -> float:
+    """Factor on a standard error that took residuals for independent: first-order autoregression in their place."""
+    scale = float(np.sum(residual**2))
+    if scale == 0.0:
+        return 1.0
+    rho = float(np.clip(np.sum(residual[1:] * residual[:-1]) / scale, 0.0, 0.9999))
+    return float(np.sqrt((1.0 + rho) / (1.0 - rho)))

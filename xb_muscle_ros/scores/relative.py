@@ -1,0 +1,134 @@
+"""Relative SRS by activation class, per fibre and over fibres.
+
+Relative SRS is the SRS of the test stretch over that of an unconditioned stretch of the same fibre and class: 1 where
+history leaves stiffness as it was, 0 where nothing is left of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.scores.activation import CLASSES
+from xb_muscle_ros.trials.trial import Array
+
+AVERAGINGS = ("mean", "mean_of_trials", "median", "ratio_of_means")
+"""Ways from fibres to one value; the paper does not say which it took where passive fibres have next to no SRS.
+
+``mean``: per fibre the mean SRS of a class over the mean unconditioned SRS of that class, then the mean over fibres.
+``mean_of_trials``: the ratio at each pCa first, then the mean over a fibre's pCa, then over fibres.
+``median``: as ``mean``, but the median over fibres. ``ratio_of_means``: the mean SRS over fibres, over the mean
+unconditioned SRS over fibres.
+"""
+
+
+class ByClass(NamedTuple):
+    """One fibre, its pCa pooled by activation class; NaN where it was not tested.
+
+    Attributes:
+        test: mean SRS of test stretches, shape (classes, ...), F0/L0.
+        unconditioned: mean SRS of unconditioned stretches of the same pCa, same shape, F0/L0.
+        ratio: mean over pCa of the one over the other, same shape.
+    """
+
+    test: Array
+    unconditioned: Array
+    ratio: Array
+
+
+class Averaged(NamedTuple):
+    """Over fibres; shape (classes, ...), NaN where no fibre was tested.
+
+    Attributes:
+        centre: relative SRS.
+        sd: standard deviation of the fibres' values (n - 1); NaN for fewer than 2.
+        n: fibres.
+    """
+
+    centre: Array
+    sd: Array
+    n: npt.NDArray[np.int64]
+
+
+def by_class(test: Array, unconditioned: Array, classes: npt.NDArray[np.int64]) -> ByClass:
+    """Pool a fibre's pCa by activation class.
+
+    Args:
+        test: shape (pca, ...), SRS of test stretches, F0/L0; NaN where not measured.
+        unconditioned: shape (pca,), SRS of the unconditioned stretch at each pCa, F0/L0.
+        classes: shape (pca,), see `activation_class`.
+    """
+    below = np.broadcast_to(unconditioned.reshape(-1, *[1] * (test.ndim - 1)), test.shape)
+    both = np.isfinite(test) & np.isfinite(below)
+    shape = (len(CLASSES), *test.shape[1:])
+    pooled = ByClass(np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan))
+    for level in range(len(CLASSES)):
+        here = classes == level
+        used = np.where(both[here], 1.0, np.nan)
+        pooled.test[level] = nanmean(test[here] * used)
+        pooled.unconditioned[level] = nanmean(below[here] * used)
+        pooled.ratio[level] = nanmean(_divided(test[here], below[here]) * used)
+    return pooled
+
+
+def over_fibres(fibres: Sequence[ByClass], averaging: str = "mean") -> Averaged:
+    """Average relative SRS over fibres.
+
+    Args:
+        fibres: at least one, of equal shapes.
+        averaging: one of `AVERAGINGS`.
+    """
+    test = np.array([fibre.test for fibre in fibres])
+    unconditioned = np.array([fibre.unconditioned for fibre in fibres])
+    each = np.array([f.ratio for f in fibres]) if averaging == "mean_of_trials" else _divided(test, unconditioned)
+    n = np.sum(np.isfinite(each), axis=0)
+    if averaging == "ratio_of_means":
+        centre = _divided(nanmean(test), nanmean(unconditioned))
+    elif averaging == "median":
+        centre = nanmedian(each)
+    else:
+        centre = nanmean(each)
+    return Averaged(centre, nansd(each), n)
+
+
+def rmsd(a: Array, b: Array, where: npt.NDArray[np.bool_]) -> tuple[float, float, int]:
+    """Root-mean-square difference, residual sum of squares and count over the conditions of a mask known to both."""
+    known = where & np.isfinite(a) & np.isfinite(b)
+    count = int(np.count_nonzero(known))
+    rss = float(np.sum((a[known] - b[known]) ** 2))
+    return (float(np.sqrt(rss / count)) if count else float("nan")), rss, count
+
+
+def nanmean(values: Array) -> Array:
+    """Mean over the first axis without NaN; NaN where nothing is left."""
+    n = np.sum(np.isfinite(values), axis=0)
+    total = np.sum(np.where(np.isfinite(values), values, 0.0), axis=0)
+    return _divided(total, np.where(n > 0, n, np.nan))
+
+
+def nanmedian(values: Array) -> Array:
+    """Median over the first axis without NaN; NaN where nothing is left."""
+    ordered = np.sort(np.where(np.isfinite(values), values, np.nan), axis=0)  # NaN goes last
+    n = np.sum(np.isfinite(values), axis=0)
+    last = np.maximum(n - 1, 0)
+    low = np.take_along_axis(ordered, (last // 2)[None], axis=0)[0]
+    high = np.take_along_axis(ordered, ((last + 1) // 2)[None], axis=0)[0]
+    middle: Array = 0.5 * (low + high)
+    return middle
+
+
+def nansd(values: Array) -> Array:
+    """Standard deviation (n - 1) over the first axis without NaN; NaN for fewer than two values."""
+    n = np.sum(np.isfinite(values), axis=0)
+    squares = np.sum(np.where(np.isfinite(values), (values - nanmean(values)) ** 2, 0.0), axis=0)
+    return np.sqrt(_divided(squares, np.where(n > 1, n - 1.0, np.nan)))
+
+
+def _divided(a: Array, b: Array) -> Array:
+    """Quotient; NaN where the divisor is zero or either is NaN."""
+    whole = np.isfinite(a) & np.isfinite(b) & (b != 0.0)
+    quotient: Array = np.where(whole, a, np.nan) / np.where(whole, b, 1.0)
+    return quotient
