@@ -108,7 +108,8 @@ class Study:
             states, steps = muscle.run_counted(start, dt, self.length, self.held, every=10)
             seconds.append(time.perf_counter() - begin)
         force = muscle.outputs_of(states)["force_f0"]
-        return Point(method, bins, strain_range, series, _EVALUATIONS * steps, float(np.median(seconds)), self._error(force))
+        taken = float(np.median(seconds))
+        return Point(method, bins, strain_range, series, _EVALUATIONS * steps, taken, self._error(force))
 
     def variable(self, tolerance: float) -> Point:
         """The Gaussian form with variable steps."""

@@ -103,7 +103,8 @@ def descend(
     # The method wants to begin strictly inside.
     margin = 1e-9 * np.maximum(1.0, np.abs(upper - lower))
     inside = np.clip(z, lower + margin, upper - margin)[moving]
-    found: Any = scipy.optimize.least_squares(
+    # SciPy's stubs take the function for the module of the same name.
+    found: Any = scipy.optimize.least_squares(  # type: ignore[operator]
         lambda part: objective.residuals(full(part)),
         inside,
         jac=lambda part: objective.slopes(full(part))[:, moving],
