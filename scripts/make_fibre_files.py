@@ -1,6 +1,6 @@
 """Write config/fibers/*.yaml from the authors' released parameter sets (parameters.json).
 
-Usage: make_fibre_files.py PARAMETERS_JSON OUT_FOLDER
+Usage: make_fibre_files.py PARAMETERS_JSON OUT_FOLDER; then fit_missing_sets.py adds the sets that nobody released.
 """
 
 from __future__ import annotations

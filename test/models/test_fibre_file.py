@@ -23,6 +23,9 @@ SETS = {
     "4state_coop": "4state_coop",
     "hill_se": "hill_se",
 }
+# Sets that nobody released, fitted here; fibres without released sets have these alone.
+FITTED = {"2state_coop", "hill"}
+FITTED_ONLY = ("12Dec2017a", "14Dec2017a", "6Aug2018a", "6Aug2018b")
 
 
 @pytest.mark.parametrize("fibre", FIBRES)
@@ -44,8 +47,26 @@ def test_defaults_and_contents(fibre: str) -> None:
     loaded = load_fibre(fibre)
     assert loaded.name == fibre
     assert loaded.model == "3state_coop"
-    assert set(loaded.available_models) == set(SETS)
+    assert set(loaded.available_models) == {*SETS, *FITTED}
     assert "van der Zee" in loaded.source
+
+
+@pytest.mark.parametrize("fibre", [*FIBRES, *FITTED_ONLY])
+def test_fitted_sets_say_that_they_are(fibre: str) -> None:
+    for model in FITTED:
+        loaded = load_fibre(fibre, model)
+        assert loaded.source.startswith("fitted by this package to ")
+        assert "not released" in loaded.source
+        assert loaded.values["smoothing"] == 0.0
+        assert "van der Zee" not in loaded.source
+
+
+@pytest.mark.parametrize("fibre", FITTED_ONLY)
+def test_fibres_without_released_sets(fibre: str) -> None:
+    loaded = load_fibre(fibre)
+    assert set(loaded.available_models) == FITTED
+    with pytest.raises(UserError, match="no parameter set here"):
+        load_fibre(fibre, "3state_coop")
 
 
 def text(**changes: object) -> str:
@@ -76,9 +97,12 @@ def text(**changes: object) -> str:
         ({"models__3state_coop__kon": None}, "needs parameter 'kon'"),
         ({"models__3state_cop": {"f": 1.0}}, "'3state_cop' is not known; did you mean '3state_coop'?"),
         ({"modell": "3state_coop"}, "'modell' is not known; did you mean 'model'?"),
-        ({"model": "2state_coop"}, "model '2state_coop' has no parameter set here; there are 2state, 3state_coop"),
         (
-            {"model": "2state_coop_rigid"},
+            {"model": "2state_coop", "models__2state_coop": None},
+            "model '2state_coop' has no parameter set here; there are 2state, 3state_coop",
+        ),
+        (
+            {"model": "2state_coop_rigid", "models__2state_coop": None},
             "'2state_coop_rigid' has no parameter set here, nor has '2state_coop'; there are",
         ),
         (
@@ -139,13 +163,16 @@ def test_malformed_files_are_one_line(tmp_path: Path, content: str) -> None:
     ids=lambda x: x if isinstance(x, str) else "",
 )
 def test_variants_use_the_set_of_their_base(
-    variant: str, base: str, left_out: set[str], added: dict[str, float]
+    tmp_path: Path, variant: str, base: str, left_out: set[str], added: dict[str, float]
 ) -> None:
-    fibre = load_fibre("18Dec2017a", variant)
+    # Hill without series element has a set of its own in the package's files.
+    file = tmp_path / "fibre.yaml"
+    file.write_text(text(models__hill=None))
+    fibre = load_fibre(file, variant)
     wanted = {k: v for k, v in load_fibre("18Dec2017a", base).values.items() if k not in left_out}
     assert dict(fibre.values) == {**wanted, **added}
     assert fibre.model == variant
-    assert set(fibre.available_models) == set(SETS)
+    assert set(fibre.available_models) == {*SETS, *FITTED} - {"hill"}
 
 
 def test_a_variants_own_set_needs_to_name_what_differs_only(tmp_path: Path) -> None:
