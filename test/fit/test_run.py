@@ -168,6 +168,17 @@ def test_no_finite_start(problem: Problem) -> None:
         fit(replace(problem, trials=(jump,)), Settings(1), HERE)
 
 
+def test_a_random_start_without_a_solution_is_left_out(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
+    def starts(problem: Problem, settings: Settings) -> list[np.ndarray]:
+        return [problem.start, problem.start + 200.0]
+
+    monkeypatch.setattr(fit_run, "_starts", starts)
+    found = fit(problem, Settings(2, level=None), HERE)
+    assert found.starts[0] is not None
+    assert found.starts[1] is None
+    assert any("1 of 2 starts led nowhere" in line for line in warnings(found))
+
+
 def test_number_of_starts(problem: Problem) -> None:
     with pytest.raises(UserError, match="number of starts is 0"):
         fit(problem, Settings(0), HERE)

@@ -108,10 +108,15 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
 
 
 def start_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
-    """One descent; None where it begins and ends without a solution."""
+    """One descent; None where the model has no solution at its start, from where nothing tells which way to go."""
     objective = Objective(Training(Problem.from_json(task["problem"])), Scale(*task["scale"]))
-    found = descend(objective, np.array(task["z"]))
-    return None if not np.isfinite(found.rmsd_f0) else _solution_to_json(found)
+    z = np.array(task["z"])
+    try:
+        objective.training.force(z)
+        objective.training.feature_distance(z)
+    except UserError:
+        return None
+    return _solution_to_json(descend(objective, z))
 
 
 def profile_task(task: Mapping[str, Any]) -> dict[str, Any]:
