@@ -17,7 +17,7 @@ from xb_muscle_ros.fit.calibration import calibrated_force
 from xb_muscle_ros.fit.coordinates import Choice, fault_coordinates, parameter_coordinates, population_choices
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.features import F0_ANCHOR, Feature, measured, simulated
-from xb_muscle_ros.fit.noise import FIRST, autocovariance, scale_of
+from xb_muscle_ros.fit.noise import FIRST, autocovariance, noise_autocovariances, scale_of
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.solve import Objective, descend
 from xb_muscle_ros.fit.split import held_out
@@ -238,3 +238,30 @@ def test_stretches_of_a_fibre_that_has_run_down_are_left_out(tmp_path: Path) -> 
     with pytest.raises(UserError, match="'b' is not among a"):
         measured(path, "b")
     assert all(f.kind == "isometric_force" for f in measured(path, "a", stiffness=False))
+
+
+def test_noise_is_found_behind_what_a_fit_took_of_it() -> None:
+    """Slow regressors take the slow part of coloured noise away; corrected, its size and memory come back."""
+    random = np.random.default_rng(3)
+    n, trials = 420, 6
+    slow = np.stack([np.cos(np.pi * k * np.arange(n) / n) for k in range(3)], axis=1)
+    slow /= np.linalg.norm(slow, axis=0)
+    plain, corrected = [], []
+    for _ in range(8):
+        noise = [coloured_noise(random, n) for _ in range(trials)]
+        basis = np.kron(np.eye(trials), slow)
+
+        def left(e: np.ndarray, basis: np.ndarray = basis) -> np.ndarray:
+            return e - basis @ np.linalg.lstsq(basis, e, rcond=None)[0]
+
+        residual = left(np.concatenate(noise)[:, None])[:, 0].reshape(trials, n)
+        # Variance of a slow sum, which is what makes a slow parameter uncertain.
+        share = 1.0 - np.arange(n) / n
+        for target, gammas in (
+            (plain, [autocovariance(r, n) for r in residual]),
+            (corrected, noise_autocovariances(list(residual), left)),
+        ):
+            target.append(np.mean([2.0 * float(share @ g) - g[0] for g in gammas]))
+    true = 1e-6 * (2.0 * float(share @ 0.95 ** np.arange(n)) - 1.0)
+    assert np.mean(plain) < 0.7 * true
+    assert np.mean(corrected) == pytest.approx(true, rel=0.3)

@@ -7,17 +7,21 @@ narrow.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import matmul_toeplitz, solve_toeplitz
+from scipy.signal import lfilter
 
 Array = npt.NDArray[np.float64]
 
 # Autoregression of this order catches both slow misfit and the hum of 40 to 80 Hz in real recordings at 1 kHz.
 _ORDER = 6
+# Rounds of correcting for what the fit took, draws in each, and samples until a drawn noise forgets how it began.
+_ROUNDS, _DRAWS, _BURN_IN = 3, 60, 600
 # Far finer than any sampling of the noise matters; also where no noise was added at all.
 _LEAST_SD_F0 = 1e-5
 
@@ -38,21 +42,95 @@ class Scale(NamedTuple):
 FIRST = Scale(0.01, 40.0)
 
 
-def autocovariance(residual: Array, lags: int) -> Array:
-    """Autocovariance of one trial's residual at lags 0 to `lags` - 1, shape (lags,), by an autoregression."""
-    n = residual.size
-    order = min(_ORDER, n // 10)
-    sample = np.array([float(residual[: n - k] @ residual[k:]) / n for k in range(order + 1)])
+def sample_autocovariance(residual: Array, order: int) -> Array:
+    """Mean product of samples at lags 0 to `order` of the last axis, shape (..., order + 1)."""
+    n = residual.shape[-1]
+    products = [np.sum(residual[..., : n - k] * residual[..., k:], axis=-1) / n for k in range(order + 1)]
+    return np.stack(products, axis=-1)
+
+
+def extended(sample: Array, lags: int) -> Array:
+    """Autocovariance at lags 0 to `lags` - 1 of the autoregression that begins with this one, shape (lags,)."""
+    order = sample.size - 1
     if sample[0] <= 0.0:
         return np.zeros(lags)
-    # A trace of white noise keeps the equations regular where residuals are smoother than the order.
-    sample[0] *= 1.0 + 1e-6
-    weights = solve_toeplitz(sample[:order], sample[1 : order + 1])
+    weights = _weights(sample)
     out = np.zeros(max(lags, order + 1))
     out[: order + 1] = sample
     for k in range(order + 1, lags):
         out[k] = weights @ out[k - order : k][::-1]
     return out[:lags]
+
+
+def autocovariance(residual: Array, lags: int) -> Array:
+    """Autocovariance of one trial's residual at lags 0 to `lags` - 1, shape (lags,), by an autoregression."""
+    return extended(sample_autocovariance(residual, min(_ORDER, residual.size // 10)), lags)
+
+
+def _weights(sample: Array) -> Array:
+    """Weights of the autoregression (Yule-Walker); a trace of white noise keeps the equations regular."""
+    regular = sample.copy()
+    regular[0] *= 1.0 + 1e-6
+    weights: Array = solve_toeplitz(regular[:-1], regular[1:])
+    return weights
+
+
+def _stable(sample: Array) -> bool:
+    """Whether there is noise with this autocovariance that does not grow."""
+    roots = np.roots(np.concatenate([[1.0], -_weights(sample)]))
+    return bool(np.all(np.abs(roots) < 1.0))
+
+
+def noise_autocovariances(residuals: Sequence[Array], left: Callable[[Array], Array]) -> list[Array]:
+    """Autocovariance of the noise of each trial, shape (samples,) each, from what a fit left of it.
+
+    A fit takes the noise that looks like its parameters' doing out of the residuals: most of the slow part, which is
+    what makes slow parameters uncertain. What it would have taken from noise of the autocovariance supposed is found
+    by drawing such noise and fitting it (linearly), and is given back. Trials share the colour of noise, not its size.
+
+    Args:
+        residuals: of each trial.
+        left: what fitting leaves of noise: (samples of all trials, draws) -> the same shape.
+    """
+    order = min([_ORDER, *(r.size // 10 for r in residuals)])
+    found = np.array([sample_autocovariance(r, order) for r in residuals])
+    if not np.any(found[:, 0] > 0.0):
+        return [np.zeros(r.size) for r in residuals]
+    colour, sizes = _colour(found), found[:, 0].copy()
+    supposed = colour.copy()
+    ends = np.cumsum([0, *(r.size for r in residuals)])
+    for _ in range(_ROUNDS):
+        random = np.random.default_rng(0)
+        drawn = [_drawn(size * supposed, r.size, random) for size, r in zip(sizes, residuals, strict=True)]
+        kept = left(np.concatenate(drawn, axis=0))
+        again = np.array(
+            [
+                np.mean(sample_autocovariance(kept[begin:end].T, order), axis=0)
+                for begin, end in itertools.pairwise(ends)
+            ]
+        )
+        sizes = sizes * np.clip(found[:, 0] / np.maximum(again[:, 0], 1e-300), 0.5, 2.0)
+        change = colour - _colour(again)
+        steps = (supposed + share * change for share in (1.0, 0.5, 0.25))
+        supposed = next((step for step in steps if _stable(step)), supposed)
+    return [extended(size * supposed, r.size) for size, r in zip(sizes, residuals, strict=True)]
+
+
+def _colour(autocovariances: Array) -> Array:
+    """Correlation at each lag that trials share, shape (order + 1,)."""
+    total: Array = autocovariances.sum(axis=0) / max(float(autocovariances[:, 0].sum()), 1e-300)
+    return total
+
+
+def _drawn(sample: Array, n: int, random: np.random.Generator) -> Array:
+    """Noise of an autocovariance, shape (n, draws)."""
+    if sample[0] <= 0.0:
+        return np.zeros((n, _DRAWS))
+    weights = _weights(sample)
+    fresh = max(float(sample[0] - weights @ sample[1:]), 0.0) ** 0.5
+    white = fresh * random.normal(size=(n + _BURN_IN, _DRAWS))
+    noise: Array = lfilter([1.0], np.concatenate([[1.0], -weights]), white, axis=0)[_BURN_IN:]
+    return noise
 
 
 def scale_of(residuals: Sequence[Array], moved: int) -> Scale:
@@ -82,17 +160,16 @@ def scale_of(residuals: Sequence[Array], moved: int) -> Scale:
     return Scale(max(float(np.sqrt(total / samples / left)), _LEAST_SD_F0), correlation)
 
 
-def score_covariance(slopes: Sequence[Array], residuals: Sequence[Array], p: int) -> Array:
-    """Covariance of the sum of slope times residual over samples, shape (coordinates, coordinates).
+def score_covariance(slopes: Sequence[Array], noise: Sequence[Array], p: int) -> Array:
+    """Covariance of the sum of slope times noise over samples, shape (coordinates, coordinates).
 
     Args:
         slopes: of each trial, shape (samples, coordinates).
-        residuals: of each trial, shape (samples,): their autocovariance is taken for that of the noise.
+        noise: autocovariance of each trial's noise, shape (samples,).
         p: number of coordinates.
     """
     total = np.zeros((p, p))
-    for j, r in zip(slopes, residuals, strict=True):
-        gamma = autocovariance(r, r.size)
+    for j, gamma in zip(slopes, noise, strict=True):
         total += j.T @ matmul_toeplitz(gamma, j)
     symmetric: Array = 0.5 * (total + total.T)
     return symmetric

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import chi2
 
-from xb_muscle_ros.fit.noise import score_covariance
+from xb_muscle_ros.fit.noise import noise_autocovariances, score_covariance
 from xb_muscle_ros.fit.solve import Objective, Solution, descend
 
 Array = npt.NDArray[np.float64]
@@ -54,15 +54,19 @@ def curvature(objective: Objective, z: Array) -> Curvature:
     h = weighted.T @ weighted + certain
     here = training.slices()
     score = [slopes[s] * weights[s][:, None] ** 2 for s in here]
-    # The noise that the scale stands for: the residuals, made larger by what fitting took from them.
-    rms = float(np.sqrt(np.mean(residual**2))) if residual.size else 0.0
-    grown = objective.scale.force_sd_f0 / max(rms, 1e-12)
-    v = score_covariance(score, [grown * residual[s] for s in here], z.size) + certain
     # In units of each coordinate's own curvature, so that the inverse does not depend on units.
     unit = np.sqrt(np.maximum(np.diag(h), 1e-12))
     values, vectors = np.linalg.eigh(h / np.outer(unit, unit))
     seen = values > 1e-8 * values[-1]
     inverse = (vectors / np.where(seen, values, np.inf)) @ vectors.T / np.outer(unit, unit)
+
+    def left(noise: Array) -> Array:
+        """What the fit, taken as linear, leaves of noise."""
+        taken: Array = slopes @ (inverse @ (weighted.T @ (noise * weights[:, None])))
+        return noise - taken
+
+    noise = noise_autocovariances([residual[s] for s in here], left)
+    v = score_covariance(score, noise, z.size) + certain
     covariance = inverse @ v @ inverse
     weak = np.sqrt(np.sum(vectors[:, ~seen] ** 2, axis=1)) > 0.1
     inflation = np.diag(covariance) / np.maximum(np.diag(inverse), 1e-300)
