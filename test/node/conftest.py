@@ -43,6 +43,31 @@ def domain() -> Iterator[int]:
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = before
 
 
+class Notes:
+    """A log that remembers, one line per message: its level, then its text."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def error(self, message: str) -> None:
+        """Keep it."""
+        self.lines.append(f"error {message}")
+
+    def warning(self, message: str) -> None:
+        """Keep it."""
+        self.lines.append(f"warning {message}")
+
+    def info(self, message: str) -> None:
+        """Keep it."""
+        self.lines.append(f"info {message}")
+
+
+@pytest.fixture
+def notes() -> Notes:
+    """A log without ROS."""
+    return Notes()
+
+
 class Driver:
     """Publishes to a muscle node and collects what it says.
 

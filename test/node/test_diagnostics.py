@@ -41,6 +41,29 @@ def test_levels() -> None:
 
 
 @pytest.mark.usefixtures("domain")
+def test_length_that_stays_away() -> None:
+    """An error where the clock steps on without it, a warning where nothing steps or where it has come back."""
+    from diagnostic_msgs.msg import DiagnosticStatus
+
+    away = Status(ticks=10, violations=0, fault="", waiting="", lateness=LATE, on_timeout="hold", timeouts=2)
+    late = {"timeout_s": 0.1, "input_age_s": 1.25}
+    gone = status_of(status=away, **late)
+    assert (gone.level, gone.message) == (DiagnosticStatus.ERROR, "no length for 1.250 s: hold")
+    assert {pair.key: pair.value for pair in gone.values}["timeouts"] == "2"
+    loaded = status_of(status=away, **{**late, "input_age_s": None})
+    assert (loaded.level, loaded.message) == (DiagnosticStatus.ERROR, "no length since the state was loaded: hold")
+    lockstep = Status(ticks=10, violations=0, fault="", waiting="")
+    quiet = status_of(mode="lockstep", status=lockstep, **late)
+    assert (quiet.level, quiet.message) == (DiagnosticStatus.WARN, "no length for 1.250 s")
+    assert status_of(**{**late, "timeout_s": 0.0}).level == DiagnosticStatus.OK
+    assert status_of(**{**late, "input_age_s": 0.05}).level == DiagnosticStatus.OK
+    over = status_of(timeouts_new=1, timeout_s=0.1, input_age_s=0.05)
+    assert (over.level, over.message) == (DiagnosticStatus.WARN, "no length in time 1 times")
+    waiting = status_of(status=Status(ticks=0, violations=0, fault="", waiting="waiting for length"), **late)
+    assert waiting.message == "waiting for length"
+
+
+@pytest.mark.usefixtures("domain")
 def test_values() -> None:
     """Everything a dashboard needs, by name."""
     values = {pair.key: pair.value for pair in status_of(rate_hz=999.96, input_age_s=0.25).values}

@@ -6,7 +6,17 @@ import math
 
 import pytest
 
-from xb_muscle_ros.node.inputs import CalciumHistory, Counts, Names, Refusal, Scale, after, checked, length_change_l0
+from xb_muscle_ros.node.inputs import (
+    CalciumHistory,
+    Counts,
+    Names,
+    Refusal,
+    Scale,
+    after,
+    checked,
+    length_change_l0,
+    went_back,
+)
 
 
 def test_names_find_the_fibre_and_report_others_once() -> None:
@@ -69,6 +79,26 @@ def test_calcium_holds_from_its_stamp_on() -> None:
     assert history.at(9) is None
     assert [history.at(t) for t in (10, 19, 20, 29, 30, 99)] == [1.0, 1.0, 2.0, 2.0, 3.0, 3.0]
     assert history.last_stamp == 30
+
+
+def test_calcium_can_be_cut_where_time_goes_back() -> None:
+    """Values from a stamp on go; older ones stay."""
+    history = CalciumHistory()
+    for stamp in (10, 20, 30):
+        history.add(stamp, 0.1 * stamp)
+    history.cut(20)
+    assert history.kept() == ((10, 1.0),)
+    history.cut(0)
+    assert history.kept() == ()
+    assert history.last_stamp is None
+
+
+def test_time_goes_back_by_more_than_messages_overtake_each_other() -> None:
+    """A tenth of a second."""
+    assert not went_back(0, None)
+    assert not went_back(900_000_000, 1_000_000_000)
+    assert went_back(899_999_999, 1_000_000_000)
+    assert not went_back(2_000_000_000, 1_000_000_000)
 
 
 def test_calcium_history_is_bounded_and_keeps_the_newest() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -134,3 +135,25 @@ def test_reset_makes_earlier_stamps_good(fresh: Any) -> None:
     fresh.link.reset()
     fresh.calcium(0.0, 5.0)
     assert fresh.ask(0.0, 1.0).effort[0] == first
+
+
+def test_a_bag_in_a_loop(start: Callable[..., Any]) -> None:
+    """Under use_sim_time every turn gives the same bits, with one notice; without, and after all, it is refused."""
+    driver = start(mode="lockstep", use_sim_time=True)
+
+    def turn() -> list[float]:
+        driver.calcium(20.0, 5.0)
+        driver.calcium(20.05, 20.0)
+        return [driver.ask(20.0 + 0.01 * k, 1.0 + 1e-3 * k).effort[0] for k in range(20)]
+
+    first = turn()
+    assert len(set(first)) == 20
+    assert turn() == first
+    assert turn() == first
+    assert driver.process.log().count("of simulated time: state forgotten after 20 length and 2 calcium samples") == 2
+    report = driver.report(lambda r: r.get("odd: time went back") == "2")
+    assert report["refused"] == "0"
+    driver.link.set_parameters({"use_sim_time": False})
+    driver.send("length", 20.0, 1.0)
+    assert driver.report(lambda r: r["refused"] == "1")["odd: time went back"] == "2"
+    assert driver.ask(21.0, 1.0) is not None

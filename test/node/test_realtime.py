@@ -8,27 +8,41 @@ from typing import Any
 
 import pytest
 
-from xb_muscle_ros.errors import StateViolation
+from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.muscle import Muscle, Outputs
 from xb_muscle_ros.node.inputs import Refusal, Scale
 from xb_muscle_ros.node.realtime import Realtime, Settings
 
 SCALE = Scale(1.0, 1.0)
-SETTINGS = Settings(rate_hz=500.0, extrapolate=False, extrapolation_limit_s=0.02, max_catch_up=10)
+SETTINGS = Settings(
+    rate_hz=500.0,
+    extrapolate=False,
+    extrapolation_limit_s=0.02,
+    max_catch_up=10,
+    timeout_s=0.0,
+    on_timeout="isometric",
+    decay_s=0.1,
+)
 
 
 class Bench:
-    """A realtime thread, what it emitted and what it complained of."""
+    """A realtime thread, what it emitted and what it said."""
 
-    def __init__(self, muscle: Muscle, settings: Settings = SETTINGS) -> None:
+    def __init__(self, muscle: Muscle, settings: Settings, notes: Any) -> None:
         self.emitted: list[Outputs] = []
-        self.complaints: list[str] = []
+        self.notes = notes
+        self.simulated = False
         self.on_emit: Callable[[], None] = lambda: None
-        self.realtime = Realtime(muscle, SCALE, settings, self._emit, time.monotonic_ns, self.complaints.append)
+        self.realtime = Realtime(muscle, SCALE, settings, self._emit, time.monotonic_ns, notes, lambda: self.simulated)
 
     def _emit(self, stamp: int, outputs: Outputs, scale: Scale) -> None:
         self.emitted.append(outputs)
         self.on_emit()
+
+    def state(self) -> dict[str, float]:
+        """The newest state by name."""
+        values: Any = self.realtime._state
+        return dict(zip(self.realtime.muscle.state_names, values.tolist(), strict=True))
 
     def until(self, condition: Callable[[], Any]) -> None:
         """Wait until something holds."""
@@ -44,12 +58,12 @@ class Bench:
 
 
 @pytest.fixture
-def make() -> Iterator[Callable[..., Bench]]:
+def make(notes: Any) -> Iterator[Callable[..., Bench]]:
     """Benches whose threads end with the test."""
     benches: list[Bench] = []
 
     def start(muscle: Muscle, settings: Settings = SETTINGS) -> Bench:
-        bench = Bench(muscle, settings)
+        bench = Bench(muscle, settings, notes)
         benches.append(bench)
         bench.realtime.start()
         return bench
@@ -78,13 +92,10 @@ def test_extrapolates_by_velocity_for_a_limited_time(make: Callable[..., Bench],
     bench.realtime.take_calcium(0, 5.0)
     bench.realtime.take_length(0, 1.0, 1.0)
     bench.emit_more(100)
-    state: Any = bench.realtime._state
-    length = dict(zip(muscle.state_names, state, strict=True))["length_change"]
-    assert length == pytest.approx(0.02, abs=1e-9)
+    assert bench.state()["length_change"] == pytest.approx(0.02, abs=1e-9)
     bench.realtime.take_length(0, 1.0, None)
     bench.emit_more(10)
-    state = bench.realtime._state
-    assert dict(zip(muscle.state_names, state, strict=True))["length_change"] == 0.0
+    assert bench.state()["length_change"] == 0.0
 
 
 def test_velocity_never_leads_out_of_what_is_allowed(make: Callable[..., Bench], muscle: Muscle) -> None:
@@ -93,8 +104,7 @@ def test_velocity_never_leads_out_of_what_is_allowed(make: Callable[..., Bench],
     bench.realtime.take_calcium(0, 5.0)
     bench.realtime.take_length(0, 1.0, 900.0)
     bench.emit_more(10)
-    state: Any = bench.realtime._state
-    assert dict(zip(muscle.state_names, state, strict=True))["length_change"] == 0.0
+    assert bench.state()["length_change"] == 0.0
     with pytest.raises(Refusal, match="velocity"):
         bench.realtime.take_length(0, 1.0, 1e6)
 
@@ -144,12 +154,14 @@ def test_violation_stops_the_output_until_reset(make: Callable[..., Bench], musc
     bench.realtime.take_length(0, 1.0, None)
     bench.emit_more(3)
     bench.realtime.take_length(0, 1.2, None)
-    bench.until(lambda: bench.complaints)
+    bench.until(lambda: bench.notes.lines)
     count = len(bench.emitted)
     time.sleep(0.05)
     assert len(bench.emitted) == count
-    assert len(bench.complaints) == 1
-    assert "18Dec2017a: state q2" in bench.complaints[0]
+    assert len(bench.notes.lines) == 1
+    assert bench.notes.lines[0].startswith("error stopped: fibre 18Dec2017a: state q2")
+    with pytest.raises(UserError, match=r"stepping has stopped: .*; call ~/reset first"):
+        bench.realtime.save()
     assert bench.realtime.status().violations == 1
     bench.realtime.reset()
     bench.realtime.take_length(0, 1.0, None)
@@ -169,3 +181,115 @@ def test_stop_and_start_hold_the_state(make: Callable[..., Bench], muscle: Muscl
     bench.realtime.start()
     bench.emit_more(3)
     assert bench.realtime.status().waiting == ""
+
+
+WATCHED = SETTINGS._replace(extrapolate=True, timeout_s=0.1, extrapolation_limit_s=1.0)
+
+
+@pytest.mark.parametrize("on_timeout", ["hold", "isometric", "decay"])
+def test_length_that_stays_away(make: Callable[..., Bench], muscle: Muscle, on_timeout: str) -> None:
+    """What each behaviour does to length, velocity and calcium, and that it ends with the next sample."""
+    bench = make(muscle, WATCHED._replace(on_timeout=on_timeout, decay_s=0.05))
+    bench.realtime.take_calcium(0, 30.0)
+    bench.realtime.take_length(0, 1.0, 0.1)
+    bench.until(lambda: bench.realtime.status().on_timeout)
+    bench.emit_more(3)
+    held = bench.state()
+    assert held["velocity"] == 0.0
+    # A tenth of a second at 0.1 L0/s, and the tick that noticed.
+    assert held["length_change"] == (0.0 if on_timeout == "hold" else pytest.approx(0.01, abs=3e-4))
+    force = bench.emitted[-1].force_f0
+    bench.until(lambda: bench.state()["calcium"] < 30e-3 or on_timeout != "decay")
+    bench.emit_more(20)
+    later = bench.state()
+    assert (later["length_change"], later["velocity"]) == (held["length_change"], 0.0)
+    assert (later["calcium"] == 30.0) == (on_timeout != "decay")
+    if on_timeout == "decay":
+        assert bench.emitted[-1].force_f0 < 0.5 * force
+    bench.realtime.take_length(0, 1.005, None)
+    bench.until(lambda: not bench.realtime.status().on_timeout)
+    assert bench.state()["length_change"] == 1.005 - 1.0
+    assert bench.state()["calcium"] == 30.0
+    assert bench.realtime.status().timeouts == 1
+    away, back = bench.notes.lines[:2]
+    assert away.startswith("error no length for 0.10")
+    assert away.endswith(f", timeout_s is 0.1 s: {on_timeout}")
+    assert back.startswith("info length is back after ")
+
+
+def test_an_age_of_zero_allows_any(make: Callable[..., Bench], muscle: Muscle) -> None:
+    """Off is off, and can be switched on and off while it runs; a pause is nobody's fault."""
+    bench = make(muscle)
+    bench.realtime.take_calcium(0, 5.0)
+    bench.realtime.take_length(0, 1.0, None)
+    bench.emit_more(60)
+    assert bench.realtime.status().timeouts == 0
+    bench.realtime.stop()
+    bench.realtime.settings = SETTINGS._replace(timeout_s=5.0)
+    length: Any = bench.realtime._length
+    bench.realtime._length = length._replace(arrival_ns=length.arrival_ns - 60 * 10**9)
+    bench.realtime.start()
+    bench.emit_more(3)
+    assert bench.notes.lines == []
+    bench.realtime.settings = SETTINGS._replace(timeout_s=0.001)
+    bench.until(lambda: bench.realtime.status().on_timeout == "isometric")
+    bench.realtime.settings = SETTINGS
+    bench.until(lambda: not bench.realtime.status().on_timeout)
+    assert bench.notes.lines[-1] == "info timeout_s is 0 s now: isometric ends"
+
+
+def test_a_snapshot_is_taken_up_while_running(make: Callable[..., Bench], muscle: Muscle) -> None:
+    """The state goes on at the length it had, with the calcium it had, and stamps begin anew."""
+    bench, other = make(muscle), make(muscle)
+    with pytest.raises(UserError, match="no state to save yet"):
+        bench.realtime.save()
+    bench.realtime.take_calcium(10**12, 30.0)
+    bench.realtime.take_length(10**12, 1.02, None)
+    bench.emit_more(20)
+    snapshot = bench.realtime.save()
+    other.realtime.take_calcium(2 * 10**12, 0.01)
+    other.realtime.take_length(2 * 10**12, 1.0, None)
+    other.emit_more(3)
+    other.realtime.load(snapshot)
+    other.emitted.clear()
+    other.emit_more(3)
+    assert other.emitted[0].force_f0 == pytest.approx(bench.emitted[-1].force_f0, rel=1e-6)
+    assert (other.state()["length_change"], other.state()["calcium"]) == (1.02 - 1.0, 30.0)
+    # Not settled anew with the calcium it comes with: that would be no force at all.
+    other.realtime.load(snapshot._replace(calcium=((0, 0.01),)))
+    other.emitted.clear()
+    other.emit_more(1)
+    assert other.emitted[0].force_f0 > 0.4 * bench.emitted[-1].force_f0
+    other.realtime.take_length(1, 1.01, None)
+    other.emit_more(3)
+    assert other.state()["length_change"] == 1.01 - 1.0
+    other.realtime.stop()
+    other.realtime.load(snapshot)
+    other.emitted.clear()
+    other.realtime.start()
+    other.emit_more(1)
+    assert other.emitted[0].force_f0 == pytest.approx(bench.emitted[-1].force_f0, rel=1e-6)
+
+
+def test_simulated_time_may_go_back(make: Callable[..., Bench], muscle: Muscle) -> None:
+    """With one notice and a state settled anew; refused where time is real."""
+    bench = make(muscle)
+    second = 10**9
+    bench.realtime.take_calcium(9 * second, 30.0)
+    bench.realtime.take_length(9 * second, 1.0, None)
+    bench.emit_more(3)
+    for take in (bench.realtime.take_length, lambda stamp, value, _: bench.realtime.take_calcium(stamp, value)):
+        with pytest.raises(Refusal, match="came after"):
+            take(second, 1.0, None)
+    bench.simulated = True
+    with pytest.raises(Refusal, match="velocity"):
+        bench.realtime.take_length(second, 1.0, 1e6)
+    assert bench.realtime.counts == {}
+    bench.realtime.take_calcium(second, 5.0)
+    bench.realtime.take_length(second, 1.02, None)
+    bench.emit_more(5)
+    assert bench.emitted[-1].force_f0 == pytest.approx(muscle.outputs(muscle.settle(1.02 - 1.0, 5.0)).force_f0)
+    assert bench.realtime.counts == {"time went back": 1}
+    assert [line.split(":")[0] for line in bench.notes.lines] == [
+        "warning length went back from 9.000000000 s to 1.000000000 s of simulated time"
+    ]

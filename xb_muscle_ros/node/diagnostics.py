@@ -24,6 +24,8 @@ class Report:
         odd: input that was taken but is worth knowing of, by reason.
         ignored_names: names in messages that belong to no fibre here.
         cpu_share: of one core since the last report, whole process.
+        overruns_new, timeouts_new: since the last report.
+        timeout_s: allowed age of the newest length sample; 0 for any.
     """
 
     node: str
@@ -39,6 +41,8 @@ class Report:
     ignored_names: int = 0
     cpu_share: float = 0.0
     overruns_new: int = 0
+    timeouts_new: int = 0
+    timeout_s: float = 0.0
 
 
 def diagnostics(report: Report) -> DiagnosticArray:
@@ -65,13 +69,24 @@ def _verdict(report: Report) -> tuple[bytes, str]:
     if status.fault:
         return DiagnosticStatus.ERROR, f"stopped: {status.fault}; call ~/reset to start again"
     remarks = [status.waiting] if status.waiting else []
+    level = DiagnosticStatus.WARN
+    age_s = report.input_age_s
+    since = "since the state was loaded" if age_s is None else f"for {age_s:.3f} s"
+    if status.on_timeout:
+        # The force goes on, but is no longer an answer to anything.
+        level = DiagnosticStatus.ERROR
+        remarks.append(f"no length {since}: {status.on_timeout}")
+    elif not status.waiting and 0.0 < report.timeout_s < (age_s or 0.0):
+        remarks.append(f"no length {since}")
+    elif report.timeouts_new:
+        remarks.append(f"no length in time {report.timeouts_new} times")
     if refused:
         remarks.append(f"refused {refused} samples")
     if odd:
         remarks.append(f"odd input {odd} times")
     if report.overruns_new:
         remarks.append(f"{report.overruns_new} overruns")
-    return (DiagnosticStatus.WARN, "; ".join(remarks)) if remarks else (DiagnosticStatus.OK, "stepping")
+    return (level, "; ".join(remarks)) if remarks else (DiagnosticStatus.OK, "stepping")
 
 
 def _values(report: Report) -> Mapping[str, str]:
@@ -97,6 +112,7 @@ def _values(report: Report) -> Mapping[str, str]:
             values["lateness max (µs)"] = f"{late.max_us:.1f}"
             values["overruns"] = str(status.overruns)
             values["dropped ticks"] = str(status.dropped)
+            values["timeouts"] = str(status.timeouts)
     values["refused"] = str(sum(report.refused.values()))
     values.update({f"refused: {reason}": str(count) for reason, count in sorted(report.refused.items())})
     values.update({f"odd: {reason}": str(count) for reason, count in sorted(report.odd.items())})

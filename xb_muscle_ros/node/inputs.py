@@ -12,6 +12,8 @@ LENGTH_CHANGE_L0 = (-0.5, 0.5)
 CALCIUM_UM = (0.0, 1e4)
 VELOCITY_L0_PER_S = (-1e3, 1e3)
 LONGEST_GAP_S = 3600.0
+# Messages that overtake each other do so by milliseconds; a bag that starts again goes back by its whole length.
+BACK_S = 0.1
 
 _CALCIUM_KEPT = 1024
 
@@ -125,6 +127,11 @@ def after(stamp: int, last: int | None, what: str) -> int:
     return stamp
 
 
+def went_back(stamp: int, last: int | None) -> bool:
+    """Whether a stamp (ns) lies so far before the last one that time itself must have gone back: by more than 0.1 s."""
+    return last is not None and last - stamp > BACK_S * 1e9
+
+
 class CalciumHistory:
     """Calcium by stamp, held until the next one; keeps only what a later question can need."""
 
@@ -147,9 +154,14 @@ class CalciumHistory:
             kept.popleft()
         return kept[0][1] if kept and kept[0][0] <= stamp else None
 
-    def clear(self) -> None:
-        """Forget all."""
-        self._kept.clear()
+    def cut(self, stamp: int) -> None:
+        """Forget values that hold from `stamp` (ns) or later on."""
+        while self._kept and self._kept[-1][0] >= stamp:
+            self._kept.pop()
+
+    def kept(self) -> tuple[tuple[int, float], ...]:
+        """Stamps (ns) and values (µM) that later questions can need."""
+        return tuple(self._kept)
 
 
 class Counts(Counter[str]):

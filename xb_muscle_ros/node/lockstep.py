@@ -18,8 +18,9 @@ from xb_muscle_ros.node.inputs import (
     after,
     checked,
     length_change_l0,
+    went_back,
 )
-from xb_muscle_ros.node.status import Account, Status
+from xb_muscle_ros.node.status import Account, Log, Snapshot, Status, time_went_back
 
 Emit = Callable[[int, Outputs, Scale], None]
 
@@ -30,17 +31,29 @@ class Lockstep:
     Calcium is held from its stamp to the next one. The step that ends at t_k uses the newest calcium with a stamp not
     after t_(k-1), so that a calcium sample has one whole step's time to arrive. The first sample settles isometrically.
 
+    Where time is simulated, a length sample whose stamp went back (see `went_back`) resets and settles anew.
+
     Attributes:
         muscle: what is stepped; may be exchanged between samples for one of the same model.
         next_scale: becomes the scale in use at the next reset.
         counts: what was odd about the input that was taken nevertheless.
     """
 
-    def __init__(self, muscle: Muscle, scale: Scale, emit: Emit) -> None:
+    def __init__(self, muscle: Muscle, scale: Scale, emit: Emit, log: Log, simulated_time: Callable[[], bool]) -> None:
+        """Keep what is needed.
+
+        Args:
+            muscle, scale: see above.
+            emit: called with stamp, outputs and scale of every answer.
+            log: told when time went back.
+            simulated_time: whether time may go back.
+        """
         self.muscle = muscle
         self.next_scale = scale
         self.counts = Counts()
         self._emit = emit
+        self._log = log
+        self._simulated_time = simulated_time
         self._samples = 0
         self._violations = 0
         self._run = _Run(scale)
@@ -54,7 +67,31 @@ class Lockstep:
     def reset(self) -> Account:
         """Forget state, stamps and calcium; the next length sample settles anew. Returns what was taken until now."""
         run, self._run = self._run, _Run(self.next_scale)
-        return Account(run.samples, run.calcium_samples, run.late)
+        return run.account()
+
+    def save(self) -> Snapshot:
+        """All that the answers to later samples depend on.
+
+        Raises:
+            UserError: there is no state yet, or integration failed.
+        """
+        run = self._run
+        if run.fault:
+            raise UserError(f"there is no state to save, stepping has stopped: {run.fault}; call ~/reset first")
+        if run.state is None:
+            raise UserError("there is no state to save yet: the fibre settles with the first length sample")
+        return Snapshot(run.state, run.scale, run.calcium.kept(), run.stamp, run.asked, run.account())
+
+    def load(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot: the next length sample is the one after its last; all taken since is forgotten."""
+        run = self._run = _Run(snapshot.scale)
+        run.state = snapshot.state
+        run.change = float(snapshot.state[-3])
+        run.stamp, run.asked = snapshot.stamp, snapshot.asked
+        for stamp, calcium_um in snapshot.calcium:
+            run.calcium.add(stamp, calcium_um)
+        run.calcium_stamp = run.calcium.last_stamp
+        run.samples, run.calcium_samples, run.late = snapshot.account
 
     def take_calcium(self, stamp: int, calcium_um: float) -> None:
         """Keep a calcium sample (stamp in ns, µM).
@@ -62,8 +99,18 @@ class Lockstep:
         Raises:
             Refusal: the stamp is not after the last one.
         """
-        run = self._run
-        run.calcium.add(after(stamp, run.calcium.last_stamp, "calcium"), calcium_um)
+        run, last = self._run, self._run.calcium_stamp
+        if last is not None and stamp <= last and self._simulated_time():
+            if went_back(stamp, run.stamp):
+                self._keep_for_later(stamp, calcium_um)
+                return
+            if went_back(stamp, last):
+                # Length went back first; a straggler from before has no say in what comes after the last.
+                last = None
+        run.calcium_stamp = after(stamp, last, "calcium")
+        # Values from before time went back yield.
+        run.calcium.cut(stamp)
+        run.calcium.add(stamp, calcium_um)
         run.calcium_samples += 1
         if run.asked is not None and stamp <= run.asked:
             # A step that should have used it is done: this run differs from an offline replay of the same samples.
@@ -78,10 +125,13 @@ class Lockstep:
             UserError: integration failed; it stays stopped until the next reset.
         """
         del velocity_m_per_s
-        run = self._run
-        if run.fault:
+        back = went_back(stamp, self._run.stamp) and self._simulated_time()
+        if self._run.fault and not back:
             raise Refusal("stopped", "integration failed before; call ~/reset to start again")
-        change = length_change_l0(position_m, run.scale)
+        change = length_change_l0(position_m, self.next_scale if back else self._run.scale)
+        if back:
+            self._begin_again(stamp)
+        run = self._run
         last = run.stamp
         stamp = after(stamp, last, "length")
         asked = stamp if last is None else last
@@ -110,6 +160,32 @@ class Lockstep:
         waiting = "" if self._run.state is not None else "waiting for the first length sample and its calcium"
         return Status(ticks=self._samples, violations=self._violations, fault=self._run.fault, waiting=waiting)
 
+    def _keep_for_later(self, stamp: int, calcium_um: float) -> None:
+        """Calcium that came before the length that takes time back waits for it."""
+        coming = self._run.coming
+        last = coming.last_stamp
+        if went_back(stamp, last):
+            coming.cut(stamp)
+            last = None
+        coming.add(after(stamp, last, "calcium"), calcium_um)
+        self.counts["calcium before its length went back"] += 1
+
+    def _begin_again(self, stamp: int) -> None:
+        old = self._run
+        account = self.reset()
+        run = self._run
+        # Calcium from before that time still holds, unless newer has come for it.
+        run.calcium = old.calcium
+        run.calcium.cut(stamp + 1)
+        for when, calcium_um in old.coming.kept():
+            run.calcium.cut(when)
+            run.calcium.add(when, calcium_um)
+        run.calcium_stamp = old.coming.last_stamp
+        run.calcium_samples = len(old.coming.kept())
+        self.counts["time went back"] += 1
+        assert old.stamp is not None
+        self._log.warning(time_went_back(old.stamp, stamp, account))
+
 
 class _Run:
     """What a reset forgets."""
@@ -122,7 +198,15 @@ class _Run:
         self.change = 0.0
         self.asked: int | None = None
         self.calcium = CalciumHistory()
+        # Stamp of the last calcium sample of this run, ns; older ones may be left from before time went back.
+        self.calcium_stamp: int | None = None
+        # Calcium of a time that length has yet to go back to.
+        self.coming = CalciumHistory()
         self.fault = ""
         self.samples = 0
         self.calcium_samples = 0
         self.late = 0
+
+    def account(self) -> Account:
+        """What was taken."""
+        return Account(self.samples, self.calcium_samples, self.late)

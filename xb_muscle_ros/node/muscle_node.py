@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 import time
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.clock import Clock
@@ -27,6 +28,7 @@ from xb_muscle_ros.node.outputs import OutputMessages
 from xb_muscle_ros.node.parameter_gate import ParameterGate
 from xb_muscle_ros.node.realtime import Realtime, Settings
 from xb_muscle_ros.node.reporter import Reporter
+from xb_muscle_ros.node.saved_state import Stepping, load_state, save_state
 
 _DEEP = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
 _NEWEST = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
@@ -58,6 +60,8 @@ class MuscleNode(LifecycleNode):
         self._entities: list[tuple[Any, Any]] = []
         self._reporter = Reporter(self, self._mode)
         self.create_service(Trigger, "~/reset", self._on_reset)
+        self.create_service(Trigger, "~/save_state", self._on_save)
+        self.create_service(Trigger, "~/load_state", self._on_load)
         # The default timer would follow ROS time, which may stand still.
         self._clock_of_reports = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(1.0, self._report, clock=self._clock_of_reports)
@@ -141,14 +145,15 @@ class MuscleNode(LifecycleNode):
         )
         emit = OutputMessages(fibre.name, force, moments).publish
         scale = _scale(fibre)
+        log = self.get_logger()
         if self._mode == "lockstep":
-            self._stepping = Lockstep(muscle, scale, emit)
+            self._stepping = Lockstep(muscle, scale, emit, log, self._simulated_time)
         else:
             clock = self.get_clock()
             self._stepping = Realtime(
-                muscle, scale, self._settings(), emit, lambda: int(clock.now().nanoseconds), self.get_logger().error
+                muscle, scale, self._settings(), emit, lambda: int(clock.now().nanoseconds), log, self._simulated_time
             )
-        self._inlet = Inlet(fibre.name, self._stepping, self.get_logger())
+        self._inlet = Inlet(fibre.name, self._stepping, log)
         # Calcium first: where both wait, it is then taken before the length that needs it.
         for topic, take in (("muscle/calcium", self._inlet.take_calcium), ("muscle/length", self._inlet.take_length)):
             made = self.create_subscription(JointState, topic, take, _INPUT_QOS[self._mode], **_overridable())
@@ -186,6 +191,9 @@ class MuscleNode(LifecycleNode):
         self._free()
         return TransitionCallbackReturn.FAILURE
 
+    def _simulated_time(self) -> bool:
+        return bool(self.get_parameter("use_sim_time").value)
+
     def _settings(self) -> Settings:
         return Settings(*(self._gate.value(name) for name in Settings._fields))
 
@@ -212,9 +220,27 @@ class MuscleNode(LifecycleNode):
         )
         return response
 
+    def _on_save(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return self._keep(save_state, response)
+
+    def _on_load(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return self._keep(load_state, response)
+
+    def _keep(self, act: Callable[[str, str, Stepping], str], response: Trigger.Response) -> Trigger.Response:
+        try:
+            if self._stepping is None:
+                raise UserError("the node is not configured; configure it first")
+            response.message = act(self._gate.value("state_file"), self._mode, self._stepping)
+            response.success = True
+            self.get_logger().info(response.message)
+        except UserError as error:
+            response.message = str(error)
+            self.get_logger().error(response.message)
+        return response
+
     def _report(self) -> None:
         label = self._state_machine.current_state[1]
-        self._reporter.report(label, time.monotonic())
+        self._reporter.report(label, time.monotonic(), self._gate.value("timeout_s"))
 
     def _survive_wrong_transitions(self) -> None:
         """Answer a transition that is not allowed here with failure; rclpy would end the process over it."""

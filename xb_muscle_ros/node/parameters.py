@@ -11,6 +11,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS
+from xb_muscle_ros.node.watchdog import DECAY, HOLD, ISOMETRIC
 
 Value = bool | int | float | str
 
@@ -51,6 +52,23 @@ NODE_PARAMETERS: Mapping[str, Row] = MappingProxyType(
         "max_catch_up": Row(
             10, "ticks", "most ticks made up for at once after a late wake-up; more are dropped", ALWAYS, 0, 1000
         ),
+        "timeout_s": Row(
+            0.0,
+            "s",
+            "age of the newest length sample beyond which on_timeout acts; 0: no age is too old",
+            ALWAYS,
+            0.0,
+            3600.0,
+        ),
+        "on_timeout": Row(
+            ISOMETRIC,
+            "",
+            "hold: length of the last sample; isometric: that of the fibre; decay: isometric, calcium falls to zero",
+            ALWAYS,
+            choices=(HOLD, ISOMETRIC, DECAY),
+        ),
+        "decay_s": Row(0.1, "s", "time constant of calcium with on_timeout decay", ALWAYS, 0.001, 1000.0),
+        "state_file": Row("", "", "file that ~/save_state writes and ~/load_state reads", ALWAYS),
     }
 )
 

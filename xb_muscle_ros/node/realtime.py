@@ -21,11 +21,13 @@ from xb_muscle_ros.node.inputs import (
     after,
     checked,
     length_change_l0,
+    went_back,
 )
 from xb_muscle_ros.node.lateness import Lateness
 from xb_muscle_ros.node.lockstep import Emit
-from xb_muscle_ros.node.status import Account, Status
+from xb_muscle_ros.node.status import Account, Log, Snapshot, Status, time_went_back
 from xb_muscle_ros.node.waiting import make_waiter
+from xb_muscle_ros.node.watchdog import Watchdog, unfed
 
 # How long another thread may keep the interpreter while a tick waits for it (the default is 5 ms).
 _SWITCH_INTERVAL_S = 1e-4
@@ -38,6 +40,9 @@ class Settings(NamedTuple):
     extrapolate: bool
     extrapolation_limit_s: float
     max_catch_up: int
+    timeout_s: float
+    on_timeout: str
+    decay_s: float
 
 
 class _Length(NamedTuple):
@@ -50,7 +55,7 @@ class Realtime:
     """Steps at absolute deadlines; between samples the length is held, or carried on by its velocity.
 
     Callbacks put the newest input in place, the thread takes it from there; each is one reference, so neither waits for
-    the other.
+    the other. Where length stays away for longer than the settings allow, the watchdog takes its place.
 
     Attributes:
         muscle: what is stepped; may be exchanged between ticks for one of the same model.
@@ -66,7 +71,8 @@ class Realtime:
         settings: Settings,
         emit: Emit,
         clock_ns: Callable[[], int],
-        complain: Callable[[str], None],
+        log: Log,
+        simulated_time: Callable[[], bool],
     ) -> None:
         """Keep what is needed; `start` starts.
 
@@ -74,7 +80,9 @@ class Realtime:
             muscle, scale, settings: see above.
             emit: called in the thread with stamp, outputs and scale.
             clock_ns: time of the output's stamps, ns.
-            complain: called in the thread once when stepping stops.
+            log: told when stepping stops, when length stays away and comes back (both in the thread), and when time
+                went back.
+            simulated_time: whether the time of stamps may go back.
         """
         self.muscle = muscle
         self.settings = settings
@@ -82,12 +90,14 @@ class Realtime:
         self.counts = Counts()
         self._emit = emit
         self._clock_ns = clock_ns
-        self._complain = complain
+        self._log = log
+        self._simulated_time = simulated_time
         self._thread: threading.Thread | None = None
         self._stop = False
         self._ticks = 0
         self._violations = 0
         self._calcium: float | None = None
+        self._state: npt.NDArray[np.float64] | None = None
         self._account = Account()
         self.reset()
 
@@ -123,6 +133,36 @@ class Realtime:
             self._begin_anew()
         return account
 
+    def save(self) -> Snapshot:
+        """The state of the newest tick, and what drives it.
+
+        Raises:
+            UserError: there is no state yet, or integration failed.
+        """
+        # Each is read once: the thread steps on meanwhile.
+        fault, state, calcium = self._fault, None if self._reset else self._state, self._calcium
+        if fault:
+            raise UserError(f"there is no state to save, stepping has stopped: {fault}; call ~/reset first")
+        if state is None or calcium is None:
+            raise UserError("there is no state to save yet: the fibre settles with the first length and calcium")
+        return Snapshot(state, self._scale_out, ((0, calcium),), None, None, self._account)
+
+    def load(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot, isometrically at the length that the fibre had until the next length sample comes.
+
+        Stamps begin anew, whatever they were; the thread pauses for this.
+        """
+        running = self._thread is not None
+        self.stop()
+        self.reset()
+        self._account = snapshot.account
+        self._scale = self._scale_out = snapshot.scale
+        self._calcium = snapshot.calcium[-1][1]
+        self._length = _Length(float(snapshot.state[-3]), None, time.monotonic_ns())
+        self._state = snapshot.state
+        if running:
+            self.start()
+
     def take_calcium(self, stamp: int, calcium_um: float) -> None:
         """Use a calcium sample (µM) from the next tick on; a stamp of 0 stands for an unstamped message.
 
@@ -130,6 +170,8 @@ class Realtime:
             Refusal: the stamp is not after the last one.
         """
         if stamp != 0:
+            if went_back(stamp, self._calcium_stamp) and self._simulated_time():
+                self._calcium_stamp = None
             self._calcium_stamp = after(stamp, self._calcium_stamp, "calcium")
         self._calcium = calcium_um
         self._account = self._account._replace(calcium=self._account.calcium + 1)
@@ -140,10 +182,14 @@ class Realtime:
         Raises:
             Refusal: the sample cannot be integrated.
         """
-        change = length_change_l0(position_m, self._scale)
+        back = stamp != 0 and went_back(stamp, self._length_stamp) and self._simulated_time()
+        scale = self.next_scale if back else self._scale
+        change = length_change_l0(position_m, scale)
         velocity = None
         if velocity_m_per_s is not None:
-            velocity = checked(velocity_m_per_s / self._scale.reference_length_m, VELOCITY_L0_PER_S, "velocity", "L0/s")
+            velocity = checked(velocity_m_per_s / scale.reference_length_m, VELOCITY_L0_PER_S, "velocity", "L0/s")
+        if back:
+            self._begin_again(stamp)
         if stamp != 0:
             self._length_stamp = after(stamp, self._length_stamp, "length")
         self._length = _Length(change, velocity, time.monotonic_ns())
@@ -163,14 +209,23 @@ class Realtime:
             self._lateness.summary(),
             self._overruns,
             self._dropped,
+            self.settings.on_timeout if self._watchdog.barking and self._state is not None else "",
+            self._watchdog.timeouts,
         )
+
+    def _begin_again(self, stamp: int) -> None:
+        last = self._length_stamp
+        assert last is not None
+        self.counts["time went back"] += 1
+        self._log.warning(time_went_back(last, stamp, self.reset()))
 
     def _begin_anew(self) -> None:
         self._reset = False
         self._scale_out = self._scale
-        self._state: npt.NDArray[np.float64] | None = None
+        self._state = None
         self._fault = ""
         self._lateness = Lateness()
+        self._watchdog = Watchdog(self._log)
         self._overruns = 0
         self._dropped = 0
 
@@ -178,7 +233,9 @@ class Realtime:
         wait = make_waiter()
         period = round(1e9 / self.settings.rate_hz)
         self._dt = period * 1e-9
-        deadline = time.monotonic_ns() + period
+        # While inactive no sample could come; its age counts from here.
+        self._begun_ns = time.monotonic_ns()
+        deadline = self._begun_ns + period
         while not self._stop:
             wait(deadline)
             if self._reset:
@@ -196,7 +253,7 @@ class Realtime:
             for i in range(made_up + 1):
                 self._lateness.note(late - i * period)
                 self._tick(deadline + i * period)
-            if not self._fault:
+            if not self._fault and not self._reset:
                 # Of ticks made up for only the newest is worth sending.
                 self._emit(self._clock_ns(), self.muscle.outputs(self._state), self._scale_out)
             deadline += (missed + 1) * period
@@ -212,18 +269,24 @@ class Realtime:
 
     def _tick(self, deadline_ns: int) -> None:
         length, calcium = self._length, self._calcium
-        # Just after a reset there is no new length yet; the reset is taken up at the next tick.
-        if self._fault or self._state is None or length is None or calcium is None:
+        # A reset is taken up at the next tick; asked after the length is read, no new length meets the old state.
+        if self._reset or self._fault or self._state is None or length is None or calcium is None:
             return
-        change = self._change_at(length, deadline_ns)
+        settings = self.settings
+        fed_ns = max(length.arrival_ns, self._begun_ns)
+        overdue_s = self._watchdog.overdue_s(fed_ns, deadline_ns, settings.timeout_s, settings.on_timeout)
+        if overdue_s > 0.0:
+            model = float(self._state[-3])
+            change, calcium = unfed(settings.on_timeout, overdue_s, settings.decay_s, length.change_l0, model, calcium)
+        else:
+            change = self._change_at(length, deadline_ns, settings)
         try:
             self._state = self.muscle.step(self._state, change, calcium, self._dt)
         except UserError as error:
             self._fail(error)
         self._ticks += 1
 
-    def _change_at(self, length: _Length, time_ns: int) -> float:
-        settings = self.settings
+    def _change_at(self, length: _Length, time_ns: int, settings: Settings) -> float:
         if not settings.extrapolate or length.velocity_l0_per_s is None:
             return length.change_l0
         ahead = min(max((time_ns - length.arrival_ns) * 1e-9, 0.0), settings.extrapolation_limit_s)
@@ -235,4 +298,4 @@ class Realtime:
         if isinstance(error, StateViolation):
             self._violations += 1
         self._fault = f"{error} (after {self._ticks * self._dt:.3f} s of stepping)"
-        self._complain(self._fault)
+        self._log.error(f"stopped: {self._fault}; call ~/reset to start again")

@@ -24,7 +24,7 @@ class Reporter:
         self._report = Report(node.get_fully_qualified_name(), mode, "unconfigured")
         self._stepping: Lockstep | Realtime | None = None
         self._inlet: Inlet | None = None
-        self._last = (time.monotonic(), time.process_time(), 0, 0)
+        self._last = (time.monotonic(), time.process_time(), 0, 0, 0)
 
     def watch(self, fibre: Fibre, stepping: Lockstep | Realtime, inlet: Inlet) -> None:
         """Report on these from now on."""
@@ -37,20 +37,23 @@ class Reporter:
         self._stepping = self._inlet = None
         self._report = Report(self._report.node, self._mode, "unconfigured")
 
-    def report(self, state: str, now_s: float) -> None:
-        """Publish once; `now_s` is steady time."""
+    def report(self, state: str, now_s: float, timeout_s: float) -> None:
+        """Publish once; `now_s` is steady time, `timeout_s` the allowed age of the newest length sample, 0 for any."""
         report = self._report
         report.state = state
         report.status = self._stepping.status() if self._stepping is not None else None
         ticks = report.status.ticks if report.status else 0
         overruns = report.status.overruns if report.status else 0
-        then, cpu_then, ticks_then, overruns_then = self._last
+        timeouts = report.status.timeouts if report.status else 0
+        then, cpu_then, ticks_then, overruns_then, timeouts_then = self._last
         cpu = time.process_time()
-        self._last = (now_s, cpu, ticks, overruns)
+        self._last = (now_s, cpu, ticks, overruns, timeouts)
         elapsed = max(now_s - then, 1e-6)
         report.rate_hz = max(ticks - ticks_then, 0) / elapsed
         report.cpu_share = (cpu - cpu_then) / elapsed
         report.overruns_new = max(overruns - overruns_then, 0)
+        report.timeouts_new = max(timeouts - timeouts_then, 0)
+        report.timeout_s = timeout_s
         if self._inlet is not None:
             report.ignored_names = self._inlet.ignored_names
             last = self._inlet.last_length_s

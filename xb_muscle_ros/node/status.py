@@ -1,12 +1,29 @@
-"""What a stepping mode tells of itself, for diagnostics."""
+"""What a stepping mode tells of itself: to diagnostics, to the log, and to be kept."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.node.inputs import Scale
 from xb_muscle_ros.node.lateness import LatenessSummary
+
+
+class Log(Protocol):
+    """What is used of an rclpy logger."""
+
+    def error(self, message: str) -> object:
+        """What stops the fibre or leaves it without input."""
+
+    def warning(self, message: str) -> object:
+        """What a user should know of."""
+
+    def info(self, message: str) -> object:
+        """What has changed for the better."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +38,8 @@ class Status:
         lateness: of ticks since the last reset; None where no clock drives them.
         overruns: deadlines that had passed before their tick was reached, since the last reset.
         dropped: of those, ticks that were not made up for.
+        on_timeout: what is done because length is overdue; empty where it is not, or where no clock drives the steps.
+        timeouts: how often length became overdue since the last reset.
     """
 
     ticks: int
@@ -30,6 +49,8 @@ class Status:
     lateness: LatenessSummary | None = None
     overruns: int = 0
     dropped: int = 0
+    on_timeout: str = ""
+    timeouts: int = 0
 
 
 class Account(NamedTuple):
@@ -52,3 +73,31 @@ class Account(NamedTuple):
         """Find an account in a text; the other way of `str`."""
         found = re.search(r"(\d+) length and (\d+) calcium samples, (\d+) of them late", text)
         return cls(*map(int, found.groups())) if found else None
+
+
+def time_went_back(last: int, stamp: int, account: Account) -> str:
+    """What to say when a length stamp (ns) goes back from the last one under simulated time."""
+    return (
+        f"length went back from {last * 1e-9:.9f} s to {stamp * 1e-9:.9f} s of simulated time: state forgotten after "
+        f"{account}; the fibre settles anew"
+    )
+
+
+class Snapshot(NamedTuple):
+    """What a fibre needs to go on from where it was.
+
+    Attributes:
+        state: state vector of the muscle, shape (n,); see `xb_muscle_ros.models.muscle.Muscle`.
+        scale: one L0 and one F0 as in use.
+        calcium: stamps (ns) and values (µM) that a later step can need, ascending; in realtime the newest, stamped 0.
+        stamp, asked: of the last length sample, and until when calcium was asked for, ns; None in realtime, where the
+            clock drives the steps.
+        account: samples taken until then.
+    """
+
+    state: npt.NDArray[np.float64]
+    scale: Scale
+    calcium: tuple[tuple[int, float], ...]
+    stamp: int | None
+    asked: int | None
+    account: Account
