@@ -20,7 +20,7 @@ setup(
     maintainer="xb_muscle_ros maintainers",
     maintainer_email="maintainers@users.noreply.github.com",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed"], f"{NAME}.bench": ["*.c"]},
+    package_data={NAME: ["py.typed"], f"{NAME}.bench": ["*.c"], f"{NAME}.plant": ["*.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -50,6 +50,7 @@ setup(
         "dask": ["cloudpickle>=2.0", "dask>=2024.1", "distributed>=2024.1"],
         "test": [
             "distributed",
+            "mujoco",
             "pytest",
             "hypothesis",
             "ruff",

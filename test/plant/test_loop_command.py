@@ -1,0 +1,77 @@
+"""``xb_muscle loop`` as a user meets it."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from xb_muscle_ros.cli.main import main
+
+pytest.importorskip("mujoco", reason="needs the extra mujoco")
+
+
+def draw_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the figure out where it is not what is tested; it takes most of the time."""
+    monkeypatch.setattr("xb_muscle_ros.figures.loop_figure.draw_loop", lambda *_: None)
+
+
+def test_files_are_identical_when_repeated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("one", "two"):
+        arguments = ["loop", "--model", "3state_coop", "--model", "mujoco", "--duration", "0.12"]
+        assert main([*arguments, "--out", str(tmp_path / name)]) == 0
+        draw_nothing(monkeypatch)
+    for file in ("loop.json", "loop.csv"):
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
+    assert (tmp_path / "one" / "loop.png").stat().st_size > 10_000
+    tree = json.loads((tmp_path / "one" / "loop.json").read_text())
+    assert [run["model"] for run in tree["runs"]] == ["3state_coop", "mujoco"]
+    assert tree["platform"]["displacement_m"] == -0.075
+    assert tree["tendon"] == "rigid"
+    said = capsys.readouterr().out
+    value = tree["runs"][0]["numbers"]["peak_force_rise_100ms_n"]
+    assert f"{value:.1f}" in said
+    rows = (tmp_path / "one" / "loop.csv").read_text().splitlines()
+    assert len(rows) == 1 + 2 * 121
+
+
+def test_knee_is_run_with_and_without_movement(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    draw_nothing(monkeypatch)
+    arguments = ["loop", "--scene", "knee", "--model", "mujoco", "--duration", "0.2", "--out", str(tmp_path)]
+    assert main(arguments) == 0
+    assert [r["moved_before"] for r in json.loads((tmp_path / "loop.json").read_text())["runs"]] == [False, True]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--model", "3state_cop"], "did you mean '3state_coop'?"),
+        (["--fiber", "nobody"], "fibre 'nobody' is not known"),
+        (["--duration", "0"], "--duration is 0 s; allowed is 0.01 to 60"),
+        (["--speed", "0"], "platform's speed is 0; allowed is 0.001 to 5"),
+        (["--displacement", "nan"], "platform's displacement is nan"),
+        (["--live"], "give one --model"),
+        (["--live", "--model", "mujoco"], "give one --model"),
+        (["--scene", "knee", "--speed", "1"], "are of the scene ankle; drop them"),
+    ],
+)
+def test_wrong_options(arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["loop", *arguments, "--out", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert message in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_the_engine(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    assert main(["loop", "--out", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "pip install 'xb_muscle_ros[mujoco]'" in said

@@ -1,0 +1,131 @@
+"""``xb_muscle loop``: a body in MuJoCo, moved by the muscle."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from xb_muscle_ros.cli.common import warn
+
+if TYPE_CHECKING:
+    from xb_muscle_ros.cli.common import Subparsers
+    from xb_muscle_ros.models.fibre_file import Fibre
+
+_MODELS = ("3state_coop", "hill_se", "hill", "mujoco")
+
+
+def add(subparsers: Subparsers) -> None:
+    """Add the command to the command line."""
+    parser = subparsers.add_parser(
+        "loop",
+        help="couple the muscle with a body in MuJoCo",
+        description="Step a body in MuJoCo and its muscles in turn: standing on a platform that moves (ankle), or the "
+        "pendulum test (knee). Writes loop.json, loop.csv and a figure, the same bytes each time.",
+    )
+    parser.add_argument("--scene", choices=("ankle", "knee"), default="ankle", help="what to move (default: ankle)")
+    parser.add_argument("--fiber", "--fibre", dest="fiber", default="18Dec2017a", help="fibre file, or name of a fibre")
+    parser.add_argument(
+        "--model",
+        dest="models",
+        action="append",
+        help=f"parameter set, or mujoco for MuJoCo's own muscle (may be given again; default: {', '.join(_MODELS)})",
+    )
+    parser.add_argument("--out", type=Path, required=True, help="folder for loop.json, loop.csv and the figure")
+    parser.add_argument("--duration", type=float, metavar="S", help="length of the run (default: ankle 0.5, knee 4)")
+    parser.add_argument(
+        "--elastic-tendon", action="store_true", help="tendons stretch (default: rigid, as with a muscle_node)"
+    )
+    parser.add_argument(
+        "--live",
+        action="store_true",
+        help="the muscles are running muscle_nodes (mode lockstep) in the namespaces /soleus and /tibialis_anterior",
+    )
+    ankle = parser.add_argument_group("platform of the scene ankle")
+    ankle.add_argument("--displacement", type=float, metavar="M", help="default -0.075: backwards")
+    ankle.add_argument("--speed", type=float, metavar="M_PER_S", help="default 0.2")
+    ankle.add_argument("--acceleration", type=float, metavar="M_PER_S2", help="default 2")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run all models, print the table, write the files."""
+    from xb_muscle_ros.errors import UserError
+    from xb_muscle_ros.figures.loop_figure import draw_loop
+    from xb_muscle_ros.plant.loop import DURATION_S, run_ankle, run_knee
+    from xb_muscle_ros.plant.plant import Plant
+    from xb_muscle_ros.plant.report import table, write
+    from xb_muscle_ros.plant.translation import RampAndHold
+
+    if arguments.live and (
+        arguments.scene != "ankle"
+        or arguments.elastic_tendon
+        or len(arguments.models or ()) != 1
+        or arguments.models == ["mujoco"]
+    ):
+        raise UserError(
+            "--live is of the scene ankle with rigid tendons and the one model that the nodes have; give one --model, "
+            "and drop --elastic-tendon"
+        )
+    scene, elastic = arguments.scene, arguments.elastic_tendon
+    duration = DURATION_S[scene] if arguments.duration is None else arguments.duration
+    if not 0.01 <= duration <= 60.0:
+        raise UserError(f"--duration is {duration:g} s; allowed is 0.01 to 60")
+    asked = {
+        "displacement_m": arguments.displacement,
+        "speed_m_per_s": arguments.speed,
+        "acceleration_m_per_s2": arguments.acceleration,
+    }
+    given = {name: value for name, value in asked.items() if value is not None}
+    if scene != "ankle" and given:
+        raise UserError("--displacement, --speed and --acceleration are of the scene ankle; drop them")
+    platform = RampAndHold(**given)
+    # Before any model is compiled: is there an engine at all?
+    plant = Plant(scene)
+    settings: dict[str, object] = {"mujoco": plant.version, "tick_s": plant.tick_s, "duration_s": duration}
+    settings["live"] = arguments.live
+    settings["tendon"] = "elastic" if elastic else "rigid"
+    fibres = _fibres(arguments.fiber, arguments.models)
+    if scene == "ankle":
+        settings["platform"] = vars(platform)
+        if arguments.live:
+            # The one place where this command touches ROS, and only when asked to.
+            from xb_muscle_ros.plant.live import run_ankle_live
+
+            traces = [run_ankle_live(fibre, platform, duration) for fibre in fibres if fibre is not None]
+        else:
+            traces = [run_ankle(fibre, platform, duration, elastic) for fibre in fibres]
+        way = "backwards" if platform.displacement_m < 0.0 else "forwards"
+        title = (
+            f"Platform moves {100 * abs(platform.displacement_m):g} cm {way}, {platform.speed_m_per_s:g} m/s, "
+            f"{platform.acceleration_m_per_s2:g} m/s²"
+        )
+    else:
+        traces = [run_knee(fibre, moved, duration, elastic) for moved in (False, True) for fibre in fibres]
+        title = "Leg released from level"
+    print(table(traces))
+    draw_loop(arguments.out / "loop.png", traces, f"{title}; {settings['tendon']} tendons")
+    for path in [*write(arguments.out, traces, settings), arguments.out / "loop.png"]:
+        print(path)
+    return 0
+
+
+def _fibres(name: str, models: list[str] | None) -> list[Fibre | None]:
+    """A fibre for each model; None is MuJoCo's muscle. A default that the fibre file has no set for is left out."""
+    from xb_muscle_ros.errors import UserError
+    from xb_muscle_ros.models.fibre_file import load_fibre
+    from xb_muscle_ros.plant.drives import OWN
+
+    fibres: list[Fibre | None] = []
+    load_fibre(name)  # a fibre that is not there is an error, not a model to leave out
+    for model in dict.fromkeys(models or _MODELS):
+        if model == OWN:
+            fibres.append(None)
+            continue
+        try:
+            fibres.append(load_fibre(name, model))
+        except UserError as error:
+            if models:
+                raise
+            warn(f"model {model} is left out: {error}")
+    return fibres

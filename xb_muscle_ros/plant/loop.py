@@ -1,0 +1,171 @@
+"""Plant and muscles stepped in turn, one muscle step to one tick of the plant, in one process."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.plant.drives import OWN, Drive, FibreDrive, OwnDrive, without_parallel
+from xb_muscle_ros.plant.plant import Array, Plant
+from xb_muscle_ros.plant.translation import RampAndHold
+
+DURATION_S = {"ankle": 0.5, "knee": 4.0}
+MOVE_RAD, MOVE_S = 0.35, 1.0
+"""Movement of the leg before its release: 20 degrees down and up again."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """What one model made of a scene, a row per tick; arrays are read-only.
+
+    Attributes:
+        scene, model: names; the model's is that of a parameter set, or ``mujoco``.
+        fibre: name, empty for ``mujoco``.
+        moved_before: the leg was moved before it was released.
+        activation: of each muscle, constant; µM of calcium, or 0 to 1 for ``mujoco``.
+        muscles: names, in the order of the columns below.
+        time_s: shape (n,), from release or from the platform's first motion.
+        angle_rad: shape (n,).
+        force_n: shape (n, muscle), pull on the tendons.
+        length_change_l0: shape (n, muscle), of the fibres.
+        torque_nm: shape (n,), of all muscles together, positive where it resists the angle.
+        load_nm_per_rad: stiffness that would just carry the load at the start (m·g·h when standing); negative: the load
+            itself is stable.
+        start_acceleration_rad_per_s2: of the angle at the start, before anything moves: 0 in equilibrium.
+    """
+
+    scene: str
+    model: str
+    fibre: str
+    moved_before: bool
+    activation: dict[str, float]
+    muscles: tuple[str, ...]
+    time_s: Array
+    angle_rad: Array
+    force_n: Array
+    length_change_l0: Array
+    torque_nm: Array
+    load_nm_per_rad: float
+    start_acceleration_rad_per_s2: float
+
+    @property
+    def label(self) -> str:
+        """Model, and whether it was moved before."""
+        return f"{self.model}, moved before" if self.moved_before else self.model
+
+
+def run_ankle(
+    fibre: Fibre | None, platform: RampAndHold, duration_s: float = DURATION_S["ankle"], elastic: bool = False
+) -> Trace:
+    """Stand at equilibrium, constant calcium, then be moved.
+
+    Args:
+        fibre: model of the muscles; None: MuJoCo's.
+        platform: how the ground moves.
+        duration_s: of the run.
+        elastic: tendons stretch; MuJoCo's muscle has none.
+
+    Raises:
+        UserError: the stance cannot be held, no MuJoCo, or the muscle's integration fails.
+    """
+    plant = Plant("ankle", own_muscles=fibre is None)
+    return couple(plant, fibre, _drive(plant, fibre, plant.load_nm(), elastic), platform, duration_s)
+
+
+def run_knee(
+    fibre: Fibre | None, moved_before: bool = False, duration_s: float = DURATION_S["knee"], elastic: bool = False
+) -> Trace:
+    """Hold the leg level with a toned muscle, then let go. See `run_ankle`.
+
+    Args:
+        fibre: see `run_ankle`.
+        moved_before: the hand that holds the leg first lowers and lifts it, as `_move`.
+        duration_s: from the release.
+        elastic: see `run_ankle`.
+    """
+    plant = Plant("knee", own_muscles=fibre is None)
+    bare = None if fibre is None else without_parallel(fibre)
+    drive = _drive(plant, bare, plant.constant("tone_nm"), elastic)
+    if moved_before:
+        _move(plant, drive)
+    return couple(plant, bare, drive, None, duration_s, moved_before)
+
+
+def _drive(plant: Plant, fibre: Fibre | None, torque_nm: float, elastic: bool) -> Drive:
+    return OwnDrive(plant, torque_nm) if fibre is None else FibreDrive(plant, fibre, torque_nm, elastic)
+
+
+def _move(plant: Plant, drive: Drive) -> None:
+    """Lower and lift the leg by `MOVE_RAD` in `MOVE_S` (one smooth cosine), and release it at once."""
+    ticks = round(MOVE_S / plant.tick_s)
+    for k in range(ticks):
+        phase = 2.0 * math.pi * k / ticks
+        plant.place(
+            plant.start_rad + 0.5 * MOVE_RAD * (1.0 - math.cos(phase)), math.sin(phase) * math.pi * MOVE_RAD / MOVE_S
+        )
+        drive.pull()
+    plant.place(plant.start_rad, 0.0)
+
+
+def couple(
+    plant: Plant,
+    fibre: Fibre | None,
+    drive: Drive,
+    platform: RampAndHold | None,
+    duration_s: float,
+    moved_before: bool = False,
+) -> Trace:
+    """Step plant and muscles in turn.
+
+    Args:
+        plant: at its start.
+        fibre: see `run_ankle`.
+        drive: the plant's muscles, settled.
+        platform: how the ground moves; None: not at all.
+        duration_s: of the run.
+        moved_before: noted in the trace.
+    """
+    load = _load_stiffness(plant)
+    count = round(duration_s / plant.tick_s) + 1
+    muscles = len(plant.muscles)
+    time, angle, torque = np.zeros(count), np.zeros(count), np.zeros(count)
+    force, length = np.zeros((count, muscles)), np.zeros((count, muscles))
+    start_acceleration = 0.0
+    for k in range(count):
+        time[k], angle[k] = plant.time_s, plant.angle_rad
+        force[k] = drive.pull()
+        length[k] = drive.fibre_length_l0()
+        torque[k] = np.dot(plant.lengthening_m_per_rad(), force[k])
+        if k == 0:
+            start_acceleration = plant.acceleration_rad_per_s2()
+        plant.step(0.0 if platform is None else platform.mean_acceleration(k * plant.tick_s, plant.tick_s))
+    for array in (time, angle, force, length, torque):
+        array.setflags(write=False)
+    return Trace(
+        scene=plant.scene,
+        model=OWN if fibre is None else fibre.model,
+        fibre="" if fibre is None else fibre.name,
+        moved_before=moved_before,
+        activation=drive.activation,
+        muscles=tuple(m.name for m in plant.muscles),
+        time_s=time,
+        angle_rad=angle,
+        force_n=force,
+        length_change_l0=length,
+        torque_nm=torque,
+        load_nm_per_rad=load,
+        start_acceleration_rad_per_s2=start_acceleration,
+    )
+
+
+def _load_stiffness(plant: Plant, step_rad: float = 1e-5) -> float:
+    """Change of the load's torque with the angle at the start, N·m/rad."""
+    torques = []
+    for sign in (1.0, -1.0):
+        plant.place(plant.start_rad + sign * step_rad, 0.0)
+        torques.append(plant.load_nm())
+    plant.place(plant.start_rad, 0.0)
+    return (torques[0] - torques[1]) / (2.0 * step_rad)
