@@ -21,7 +21,7 @@ def fibre_file(folder: Path, repo_root: Path, name: str, sets: list[str], source
     held = inner["models"]
     hill = {k: v for k, v in held["hill_se"].items() if k not in ("kse", "kse0", "smooth_stiffness")}
     inner["models"] = {key: hill if key == "hill" else held[key] for key in sets}
-    inner.update(fibre=name, model=sets[0], source=source)
+    inner.update(fibre=name, model=sets[0], source=source, sources={})
     path = folder / f"{name}.yaml"
     path.write_text(yaml.safe_dump(tree))
     return path

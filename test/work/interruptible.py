@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 import threading
 import time
@@ -20,6 +21,8 @@ def tasks(folder: str, sleep_s: float) -> list[dict[str, object]]:
 
 
 if __name__ == "__main__":
+    # A shell that starts things in the background makes them deaf to interrupts; here they are the point.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     # Interrupts may be delivered to any thread, and most programs have some.
     threading.Thread(target=time.sleep, args=(60.0,), daemon=True).start()
     try:

@@ -164,7 +164,10 @@ def test_an_interrupt_at_the_start(tmp_path: Path, delay_s: float) -> None:
         assert process.stderr.read() == ""
 
 
-def test_an_interrupt_while_a_worker_is_being_started_comes_afterwards() -> None:
+def test_an_interrupt_while_a_worker_is_being_started_comes_afterwards(request: pytest.FixtureRequest) -> None:
+    # See interruptible.py.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     beside = threading.Thread(target=time.sleep, args=(0.3,))
     beside.start()
     done = []
