@@ -48,7 +48,9 @@ setup(
     extras_require={
         "mujoco": ["mujoco>=3.1"],
         "dask": ["cloudpickle>=2.0", "dask>=2024.1", "distributed>=2024.1"],
+        "casadi": ["casadi>=3.6"],
         "test": [
+            "casadi",
             "distributed",
             "mujoco",
             "pytest",

@@ -7,12 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_fibre
+from xb_muscle_ros.cli.common import add_fibre, warn
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
 
-STUDIES = ("rhs", "trial", "batch", "start", "cost", "fast", "node")
+STUDIES = ("rhs", "trial", "batch", "start", "cost", "fast", "fit", "node")
 
 
 def add(subparsers: Subparsers) -> None:
@@ -68,6 +68,12 @@ def run(arguments: argparse.Namespace) -> int:
 
         made += fast_stretch.study(fibre.name, arguments.out.with_name("fast_stretch.png"))
         print(arguments.out.with_name("fast_stretch.png"))
+    if "fit" in arguments.study:
+        from xb_muscle_ros.bench import fit_time
+
+        if not fit_time.casadi_is_there():
+            warn(fit_time.MISSING)
+        made += fit_time.figures(fibre)
     if "node" in arguments.study:
         from xb_muscle_ros.bench import node_timing
 

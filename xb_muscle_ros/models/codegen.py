@@ -201,15 +201,20 @@ def _sum(start: list[str], weights: Iterable[float], i: int) -> str:
     return " + ".join(terms) if terms or not start else "0.0"
 
 
-def _slope(e: Equations) -> str:
-    """Rates in the moving frame, for interpolation: dx/dt = d arrival/d(state, shift) . rates, at zero shift."""
+def moving_rates(e: Equations) -> list[Any]:
+    """Rates of the states in the frame that moves along: dx/dt = d arrival/d(state, shift) . rates, at zero shift."""
     variables = [*(e.symbols[s.name] for s in e.states), e.shift]
     rates = e.derivatives[:-1]
     moving = []
     for x in e.arrival:
         total = sum(sympy.diff(x, v) * r for v, r in zip(variables, rates, strict=True))
         moving.append(sympy.sympify(total).subs(e.shift, 0))
-    body = program(moving, "t")
+    return moving
+
+
+def _slope(e: Equations) -> str:
+    """Rates of change, for interpolation and to tell whether a fibre is at rest."""
+    body = program(moving_rates(e), "t")
     lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
     lines += [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
     lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
