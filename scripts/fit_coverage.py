@@ -1,8 +1,8 @@
 """Fit made data again and again: held-out error, and how often intervals hold the truth.
 
 Each case takes the released set of one of seven fibres, changes every fitted parameter by a random factor (SD 15 %),
-lets it make trials (distribution method or Gaussian form) with noise like the real one, and fits the Gaussian form from
-the released set.
+lets it make trials (distribution method or Gaussian form) with noise like the real one, and fits either form from the
+released set.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ PCAS = (4.5, 6.1, 6.2, 6.3, 6.4, 6.6)
 TRAINING = ((0.0383, 0.1), (0.0, 0.001))
 HELD_OUT = ((0.0383, 0.001), (0.0121, 0.316), (0.0682, 0.01))
 CHANGE = 0.15
+GRID = {"bins": 101.0, "strain_range": 15.0, "regrid": 1.0}
 
 
 def case(task: dict[str, Any]) -> dict[str, Any]:
@@ -45,27 +46,30 @@ def case(task: dict[str, Any]) -> dict[str, Any]:
     names = [n for n in FITTED if n in values]
     true = {**values, **{n: values[n] * float(np.exp(CHANGE * random.normal())) for n in names}}
     if task["truth"] != "gaussian":
-        true |= {"bins": 300.0, "strain_range": 15.0, "regrid": 1.0}
+        true |= GRID
+    if task["method"] != "gaussian":
+        start = replace(start, method=task["method"], values=MappingProxyType({**values, **GRID}))
     truth = replace(start, values=MappingProxyType(true), method=task["truth"])
     muscle = Muscle(truth)
     trials, held = [], []
     for protocols, out in ((TRAINING, False), (HELD_OUT, True)):
         for amplitude, recovery in protocols:
-            for pca in PCAS:
+            for pca in task["pcas"]:
                 trials.append(made(muscle, StretchShortenStretch(amplitude, recovery).trial("made", pca), random))
                 held.append(out)
     # Nothing but the data may say where the truth lies: no priors.
     choices = {n: Choice(prior_sd=float("inf")) for n in names}
     problem = Problem(start, fit_trials(trials, held), parameter_coordinates(start, None, (), {}, choices), {})
-    found = as_json(fit(problem, Settings(starts=1), Options(processes=0, quiet=True)), {})
+    settings = Settings(starts=1, level=0.95 if task["intervals"] else None)
+    found = as_json(fit(problem, settings, Options(processes=0, quiet=True)), {})
     rows = [
         {
             "name": row["name"],
             "true": true[row["name"]],
             "value": row["value"],
-            "interval": row["interval"],
-            "held": row["interval"][0] <= true[row["name"]] <= row["interval"][1],
-            "closed": row["interval_closed"],
+            "interval": row.get("interval"),
+            "held": task["intervals"] and row["interval"][0] <= true[row["name"]] <= row["interval"][1],
+            "closed": row.get("interval_closed"),
         }
         for row in found["parameters"]
     ]
@@ -91,18 +95,20 @@ def _pairs(trials: list[Any], problem: Problem) -> Any:
     return zip(trials, problem.trials, strict=True)
 
 
-def main(cases: int, truth: str, out: Path, journal: Path | None) -> None:
+def main(cases: int, shared: dict[str, Any], out: Path, journal: Path | None) -> None:
     """Run the cases and print what came of them."""
-    tasks = [{"seed": seed, "truth": truth} for seed in range(cases)]
+    tasks = [{"seed": seed, **shared} for seed in range(cases)]
     done = run(case, tasks, Options(journal=journal, label="cases"))
     write_text(out, json.dumps(done, indent=1) + "\n")
     held = np.array([c["heldout_rmsd_f0"] for c in done])
     error = np.array([c["heldout_error_f0"] for c in done])
-    print(f"{cases} cases, made by {truth}, fitted by gaussian")
+    print(f"{cases} cases, made by {shared['truth']}, fitted by {shared['method']}")
     print(f"held-out RMSD, noise included: median {100 * np.median(held):.3f} %, largest {100 * held.max():.3f} % F0")
     print(
         f"held-out error, noise left out: median {100 * np.median(error):.3f} %, largest {100 * error.max():.3f} % F0"
     )
+    if not shared["intervals"]:
+        return
     total, inside = 0, 0
     for name in dict.fromkeys(row["name"] for c in done for row in c["parameters"]):
         rows = [row for c in done for row in c["parameters"] if row["name"] == name]
@@ -119,7 +125,11 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cases", type=int, default=50)
     parser.add_argument("--truth", choices=("gaussian", "characteristics"), default="gaussian")
+    parser.add_argument("--method", choices=("gaussian", "characteristics"), default="gaussian", help="of the fit")
+    parser.add_argument("--pca", nargs="+", type=float, default=list(PCAS))
+    parser.add_argument("--no-intervals", action="store_true")
     parser.add_argument("--out", type=Path, default=Path("out/coverage.json"))
     parser.add_argument("--journal", type=Path)
     given = parser.parse_args()
-    main(given.cases, given.truth, given.out, given.journal)
+    chosen = {"truth": given.truth, "method": given.method, "pcas": given.pca, "intervals": not given.no_intervals}
+    main(given.cases, chosen, given.out, given.journal)
