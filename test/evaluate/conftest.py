@@ -21,7 +21,7 @@ FIBRE = "18Dec2017a"
 RecordingMaker = Callable[..., Path]
 
 
-@pytest.fixture(scope="session", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def released_sets_only(tmp_path_factory: pytest.TempPathFactory, repo_root: Path) -> Iterator[None]:
     """Fibre files as the authors' sets alone would make them: what is missing then has to be told."""
     folder = tmp_path_factory.mktemp("released")

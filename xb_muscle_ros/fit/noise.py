@@ -92,6 +92,8 @@ def noise_autocovariances(residuals: Sequence[Array], left: Callable[[Array], Ar
         residuals: of each trial.
         left: what fitting leaves of noise: (samples of all trials, draws) -> the same shape.
     """
+    if not residuals:
+        return []
     order = min([_ORDER, *(r.size // 10 for r in residuals)])
     found = np.array([sample_autocovariance(r, order) for r in residuals])
     if not np.any(found[:, 0] > 0.0):
