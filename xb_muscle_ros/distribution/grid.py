@@ -49,7 +49,7 @@ class Grid(Representation):
 
     def fluxes(self, q: Quantities, ways: Ways) -> Fluxes:
         """Sums over bins, which are not expressions: symbols that the compiled step fills in."""
-        return Fluxes(Moments(q.kin0, q.kin1, 0), q.torn_off, q.reattached)
+        return Fluxes(Moments(q.kin0, q.kin1, q.kin2), q.torn_off, q.reattached)
 
     def state_rows(self, model: Composition, values: Mapping[str, float]) -> tuple[State, ...]:
         """Bins first, then the blocks' states, then the shift of the grid."""

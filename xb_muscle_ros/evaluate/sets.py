@@ -13,7 +13,7 @@ from typing import Any
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre, base_set, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.models.registry import BASE_OF, compose, model_of_set
+from xb_muscle_ros.models.registry import base_of, compose, model_of_set
 
 ORDER = ("hill", "hill_se", "2state", "2state_coop", "3state_coop", "4state_coop")
 """Models by the number of their states, simplest first (van der Zee et al. 2026)."""
@@ -74,7 +74,7 @@ class ModelSet:
 def rank(set_name: str) -> int:
     """Place of a set's model in `ORDER`."""
     model = model_of_set(set_name)
-    return ORDER.index(model if model in ORDER else BASE_OF[model])
+    return ORDER.index(model if model in ORDER else base_of(model))
 
 
 def gather(fibres: Sequence[str | Path], models: Sequence[str] | None, method: str | None) -> list[ModelSet]:

@@ -106,7 +106,8 @@ class Quantities:
 
     Names that exist in every cross-bridge model: ``calcium`` (µM), ``velocity`` (L0/s), ``length_change`` (L0),
     ``q0 q1 q2`` (moments), ``force_xb`` (cross-bridge force, power-stroke units), ``forcibly_detached`` (R),
-    ``available_sites`` (N), ``ready_heads`` (D), ``super_relaxed`` (S), ``gamma``.
+    ``available_sites`` (N), ``ready_heads`` (D), ``gamma``, and ``recruitment`` (what brings super-relaxed heads into
+    play beside force; 0 unless a mechanism says otherwise).
 
     ``positive``, ``divisor``, ``variance`` and ``limit`` are the places where the released parameter sets were fitted
     with smooth functions; without smoothing they are exact.
@@ -131,6 +132,10 @@ class Quantities:
                 f"mechanism {self._block} asks for '{name}', which no block of this model provides; "
                 f"there are {', '.join(sorted(self._values))}"
             ) from None
+
+    def __contains__(self, name: str) -> bool:
+        """Whether the model has a quantity of this name."""
+        return name in self._values
 
     def for_block(self, block: str, **more: Expr) -> Quantities:
         """The same quantities and some more, in the hands of another block."""

@@ -81,7 +81,7 @@ def c_text(model: Model, smooth: bool) -> str:
 
     e = model.equations(smooth)
     lines = _scalars(e, "z", c_style=True)
-    body = program(e.derivatives[:-1], "t")
+    body = program(_rates(e), "t")
     lines += [f"double {s} = {c(x)};" for s, x in body.lines]
     lines += [f"out[{i}] = {c(r)};" for i, r in enumerate(body.results)]
     text = "\n    ".join(lines)
@@ -90,11 +90,21 @@ def c_text(model: Model, smooth: bool) -> str:
 
 
 def _scalars(e: Equations, source: str, c_style: bool = False) -> list[str]:
-    """Lines that load parameters and states from arrays, and the shift behind the states."""
+    """Lines that load parameters and states from arrays, behind the states the shift and, if need be, the length."""
     kind, end = ("double ", ";") if c_style else ("", "")
     lines = [f"{kind}{p.name} = p[{i}]{end}" for i, p in enumerate(e.parameters)]
     lines += [f"{kind}{s.name} = {source}[{i}]{end}" for i, s in enumerate(e.states)]
-    return [*lines, f"{kind}shift = {source}[{len(e.states)}]{end}"]
+    return [*lines, *(f"{kind}{name} = {source}[{len(e.states) + i}]{end}" for i, name in enumerate(_moving(e)))]
+
+
+def _moving(e: Equations) -> list[str]:
+    """What moves within a step beside the states: the shift, and the length change where rates depend on it."""
+    return ["shift", "length_change"] if e.follows_length else ["shift"]
+
+
+def _rates(e: Equations) -> tuple[Any, ...]:
+    """Rates of the states and of what moves beside them."""
+    return e.derivatives if e.follows_length else e.derivatives[:-1]
 
 
 def function(head: str, doc: str, lines: Iterable[str]) -> str:
@@ -127,29 +137,32 @@ def used_symbols(*programs: Program) -> set[Any]:
 
 def _rhs(e: Equations) -> str:
     """Rates of change in the fixed frame, scalars in and a tuple out: nothing touches memory."""
-    body = program(e.derivatives[:-1], "t")
-    names = ", ".join([*(s.name for s in e.states), "shift"])
+    body = program(_rates(e), "t")
+    names = ", ".join([*(s.name for s in e.states), *_moving(e)])
     lines = [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
     lines.append(f"return ({', '.join(python(r) for r in body.results)},)")
     text = function(f"rates({names}, velocity, calcium, p)", "Rates of the states and of the shift.", lines)
-    loads = [f"z[{i}]" for i in range(len(e.states) + 1)]
-    call = [f"r = rates({', '.join(loads)}, velocity, calcium, p)"]
-    call += [f"out[{i}] = r[{i}]" for i in range(len(e.states) + 1)]
-    return text + "\n\n" + function("rhs(z, velocity, calcium, p, out)", "The same on arrays; z ends in shift.", call)
+    size = len(_rates(e))
+    call = [f"r = rates({', '.join(f'z[{i}]' for i in range(size))}, velocity, calcium, p)"]
+    call += [f"out[{i}] = r[{i}]" for i in range(size)]
+    doc = f"The same on arrays; z ends in {' and '.join(_moving(e))}."
+    return text + "\n\n" + function("rhs(z, velocity, calcium, p, out)", doc, call)
 
 
 def _attempt(e: Equations) -> str:
     """One Rosenbrock step, written out."""
-    names = [*(s.name for s in e.states), "shift"]
-    variables = [*(e.symbols[s.name] for s in e.states), e.shift]
+    names = [*(s.name for s in e.states), *_moving(e)]
+    variables = [*(e.symbols[s.name] for s in e.states), e.shift, e.symbols["length_change"]][: len(names)]
+    starts = ["0.0" if name == "shift" else name for name in names]
     n = len(names)
-    both, rows = jacobian(program(e.derivatives[:-1], "t"), variables, "d")
+    both, rows = jacobian(program(_rates(e), "t"), variables, "d")
     # The frame is fixed at the start of the step, so the Jacobian is wanted where the shift is zero.
     flat = Program(both.lines, [*both.results, *(x for row in rows for x in row)])
     flat = flat.substituted({e.shift: sympy.Integer(0)}).needed()
     first, entries = flat.results[:n], flat.results[n:]
     solver = Elimination([[entries[i * n + j] != 0 for j in range(n)] for i in range(n)])
     lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
+    lines += [f"length_change = s[{len(e.states)}]"] if e.follows_length else []
     lines += [*parameter_loads(e.parameters, used_symbols(flat)), *assignments(flat)]
     lines += ["per_h = 1.0 / h", f"diagonal = per_h * {1.0 / ros3.GAMMA!r}"]
     for i, j in solver.entries():
@@ -161,7 +174,7 @@ def _attempt(e: Equations) -> str:
     values, last_point = [f"f0_{i}" for i in range(n)], list[str]()
     for stage in range(len(ros3.A)):
         k = f"k{stage}"
-        point = [_sum([names[i] if i < n - 1 else "0.0"], ros3.A[stage], i) for i in range(n)]
+        point = [_sum([starts[i]], ros3.A[stage], i) for i in range(n)]
         if stage > 0 and point != last_point:
             lines.append(f"f{stage} = rates({', '.join(point)}, velocity, calcium, p)")
             values = [f"f{stage}[{i}]" for i in range(n)]
@@ -171,7 +184,7 @@ def _attempt(e: Equations) -> str:
             lines.append(f"{k}_{i} = {values[i]}" + (f" + per_h * ({memory})" if memory else ""))
         lines += solver.solve("a", k)
     lines += [f"e_{i} = {_sum([], ros3.E, i)}" for i in range(n)]
-    lines += [f"y_{i} = {_sum([names[i] if i < n - 1 else '0.0'], ros3.M, i)}" for i in range(n)]
+    lines += [f"y_{i} = {_sum([starts[i]], ros3.M, i)}" for i in range(n)]
     swap = {symbol: sympy.Symbol(f"y_{i}", real=True) for i, symbol in enumerate(variables)}
     arrival = program([x.subs(swap, simultaneous=True) for x in e.arrival], "m")
     lines += assignments(arrival)
@@ -216,6 +229,7 @@ def _slope(e: Equations) -> str:
     """Rates of change, for interpolation and to tell whether a fibre is at rest."""
     body = program(moving_rates(e), "t")
     lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
+    lines += [f"length_change = s[{len(e.states)}]"] if e.follows_length else []
     lines += [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
     lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
     return function("slope(s, velocity, calcium, p, out)", "Rates of change of the integrated states.", lines)

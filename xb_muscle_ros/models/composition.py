@@ -1,25 +1,26 @@
-"""A model as a row of blocks, and the one set of equations that they make together."""
+"""A model as a row of blocks; `models.assembly` makes one set of equations of them."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
-from xb_muscle_ros.distribution.base import Moments, Representation, Settling, Ways
+from xb_muscle_ros.distribution.base import Representation, Settling
+from xb_muscle_ros.distribution.gaussian import Gaussian
 from xb_muscle_ros.mechanisms.base import (
     Attachment,
     Detachment,
     Mechanism,
     Parallel,
     Parameter,
-    Quantities,
     Series,
     State,
     ThickFilament,
     ThinFilament,
 )
+from xb_muscle_ros.mechanisms.extra import Extra, InSeries
 from xb_muscle_ros.mechanisms.ops import Expr
 
 GAMMA = Parameter(
@@ -95,7 +96,7 @@ def distinct(rows: Iterable[Parameter]) -> tuple[Parameter, ...]:
 
 @dataclass(frozen=True)
 class Composition(Model):
-    """One block of each family and a representation of the strain distribution."""
+    """One block of each family, further mechanisms, and a representation of the strain distribution."""
 
     name: str
     thin_filament: ThinFilament
@@ -105,10 +106,11 @@ class Composition(Model):
     series: Series
     parallel: Parallel
     representation: Representation
+    extras: tuple[Extra, ...] = ()
 
     @property
-    def blocks(self) -> tuple[Mechanism, ...]:
-        """All blocks, in the order in which their states stand."""
+    def families(self) -> tuple[Mechanism, ...]:
+        """The blocks of the families, in the order in which their states stand."""
         return (
             self.thin_filament,
             self.thick_filament,
@@ -119,6 +121,11 @@ class Composition(Model):
         )
 
     @property
+    def blocks(self) -> tuple[Mechanism, ...]:
+        """All blocks, in the order in which their states stand."""
+        return (*self.families, *self.extras)
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Rows of the parameter table that this model needs, without repeats."""
         blocks = (p for block in self.blocks for p in block.parameters)
@@ -127,7 +134,8 @@ class Composition(Model):
     @property
     def states(self) -> tuple[State, ...]:
         """States that are integrated, moments first, without the inputs."""
-        return (*self.representation.states, *(s for block in self.blocks for s in block.states))
+        own = (*self.representation.states, *(s for block in self.blocks for s in block.states))
+        return (*own, *(row for row, _ in other_states(self)))
 
     def state_rows(self, values: Mapping[str, float]) -> tuple[State, ...]:
         """See the base class."""
@@ -138,13 +146,37 @@ class Composition(Model):
         """See the base class."""
         return self.representation.settling
 
+    @property
+    def in_series(self) -> InSeries | None:
+        """The mechanism that puts another half-sarcomere in series, if there is one."""
+        return next((extra for extra in self.extras if isinstance(extra, InSeries)), None)
+
     def equations(self, smooth: bool) -> Equations:
         """See the base class."""
+        from xb_muscle_ros.models.assembly import equations
+
         return equations(self, smooth)
 
     def module_text(self, smooth: bool) -> str:
         """See the base class."""
         return self.representation.module_text(self, smooth)
+
+
+# Moments of the other half-sarcomere are integrated about a moving point, where an error within the tolerance may carry
+# a vanishing second moment below zero.
+_LEAST_Q2 = -1e-2
+
+
+def other_states(model: Composition) -> list[tuple[State, str]]:
+    """States of the half-sarcomere in series with the model's own, each with the name it has in that one."""
+    if model.in_series is None:
+        return []
+    rows = [*Gaussian.states, *(s for block in model.families for s in block.states)]
+    found = []
+    for row in rows:
+        lower = _LEAST_Q2 if row.name == "q2" else row.lower
+        found.append((row._replace(name=f"{InSeries.PREFIX}{row.name}", lower=lower), row.name))
+    return found
 
 
 @dataclass(frozen=True)
@@ -175,113 +207,8 @@ class Equations:
     outputs: tuple[Expr, ...]
     shares: tuple[str, ...] = ()
 
-
-def equations(model: Composition, smooth: bool) -> Equations:
-    """Write a composition out; `smooth` picks the released sets' smooth functions.
-
-    Raises:
-        AttributeError: a block asks for a quantity that no block provides; the message names both.
-    """
-    import sympy
-
-    names = [*(s.name for s in model.states), *(i.name for i in INPUTS), *(p.name for p in model.parameters)]
-    symbols = {name: sympy.Symbol(name, real=True) for name in names}
-    shift = sympy.Symbol("shift", real=True)
-    fixed = Moments(symbols["q0"], symbols["q1"], symbols["q2"])
-    moved = _moved(fixed, shift)
-    values = {**symbols, "q0": moved.m0, "q1": moved.m1, "q2": moved.m2}
-    parts = rates(model, Quantities(values, "composition", symbols["smoothing"] if smooth else None))
-    # In the frame fixed at the start of the step a head's strain is x - shift, whatever the velocity.
-    in_fixed = _moved(parts.kinetics, -shift)
-    others = [parts.others[s.name] for s in model.states[3:]]
-    derivatives = [*in_fixed, *others, parts.q.ce_velocity, symbols["velocity"]]
-    rest_q = Quantities(symbols, "composition", None)
-    rest = [0, 0, 0]
-    for block in model.blocks:
-        rest += [block.rest(rest_q.for_block(block.name))[s.name] for s in block.states]
-    return Equations(
-        states=model.states,
-        parameters=model.parameters,
-        symbols=symbols,
-        shift=shift,
-        derivatives=tuple(sympy.sympify(e) for e in derivatives),
-        arrival=tuple(sympy.sympify(e) for e in (*moved, *(symbols[s.name] for s in model.states[3:]))),
-        rest=tuple(sympy.sympify(e) for e in rest),
-        outputs=tuple(sympy.sympify(e).subs(shift, 0) for e in output_expressions(model, parts.q)),
-        # The smooth form never divides by less than ln 2 / K heads.
-        shares=() if smooth else ("q0", "q1", "q2"),
-    )
-
-
-def _moved(m: Moments, shift: Expr) -> Moments:
-    """Moments about a point that lies `shift` lower: every strain has grown by `shift`."""
-    return Moments(m.m0, m.m1 + shift * m.m0, m.m2 + 2 * shift * m.m1 + shift**2 * m.m0)
-
-
-class Parts(NamedTuple):
-    """What `rates` puts together.
-
-    Attributes:
-        kinetics: moments of the heads per second that come and go, at constant strain.
-        others: rates of change of the blocks' own states, by name.
-        ways: how heads come and go, in terms of strain.
-        q: all quantities, ``ce_velocity`` among them.
-    """
-
-    kinetics: Moments
-    others: Mapping[str, Expr]
-    ways: Ways
-    q: Quantities
-
-
-def rates(model: Composition, q: Quantities) -> Parts:
-    """Put the blocks together, from moments and states to rates of change and velocity.
-
-    The order is fixed by who needs what: force and sites before heads, heads before fluxes, fluxes before velocity.
-    """
-    import sympy
-
-    thin, thick, detach = model.thin_filament, model.thick_filament, model.detachment
-    q = q.for_block(model.detachment.name, force_xb=q.q0 + q.q1)
-    q = q.for_block(thin.name, forcibly_detached=detach.forcibly_detached(q))
-    q = q.for_block(thick.name, available_sites=thin.available_sites(q))
-    q = q.for_block(model.attachment.name, ready_heads=thick.ready_heads(q))
-    of_detachment = q.for_block(detach.name)
-    ways = Ways(
-        attach=model.attachment.spread(q),
-        detach=detach.rates(of_detachment),
-        tear=detach.forcible_rates(of_detachment),
-        reattach=detach.reattachment(of_detachment),
-    )
-    kinetics, torn, back = model.representation.fluxes(q, ways)
-    others: dict[str, Expr] = {}
-    others.update(detach.derivatives(q.for_block(detach.name, torn_off=torn, reattached=back)))
-    others.update(thin.derivatives(q.for_block(thin.name)))
-    # Heads between attached and torn off stay out of the thick filament's balance: dQ0 + dR.
-    net = kinetics.m0 + torn - back
-    others.update(thick.derivatives(q.for_block(thick.name, attachment_rate_net=net)))
-    stiffness = sympy.sympify(q.q0)
-    force_rate = kinetics.m0 + kinetics.m1
-    q = q.for_block(model.series.name, kinetic_force_rate=force_rate, stiffness_xb=stiffness)
-    q = q.for_block("composition", ce_velocity=model.series.ce_velocity(q))
-    return Parts(kinetics, others, ways, q)
-
-
-def output_expressions(model: Composition, q: Quantities) -> list[Expr]:
-    """Expressions of `OUTPUTS`."""
-    extension = model.series.extension(q.for_block(model.series.name))
-    force_pe = model.parallel.force(q.for_block(model.parallel.name))
-    force_ce = q.Fscale * q.force_xb
-    return [
-        force_ce + force_pe,
-        force_ce,
-        force_pe,
-        q.length_change - extension / q.gamma,
-        q.ce_velocity / q.gamma,
-        q.q0,
-        q.q1,
-        q.q2,
-        q.available_sites,
-        q.ready_heads,
-        q.forcibly_detached,
-    ]
+    @property
+    def follows_length(self) -> bool:
+        """Whether rates depend on the length change itself and not on its velocity alone."""
+        length = self.symbols["length_change"]
+        return any(length in rate.free_symbols for rate in self.derivatives[:-1])

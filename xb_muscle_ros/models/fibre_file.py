@@ -12,7 +12,7 @@ import yaml
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked, complete
-from xb_muscle_ros.models.registry import BASE_OF, METHODS, compose, model_of_set, split_set
+from xb_muscle_ros.models.registry import METHODS, SEPARATOR, base_of, compose, model_of_set, split_set
 
 _TOP = ("fibre", "model", "method", "source", "sources", "constants", "models")
 
@@ -205,23 +205,30 @@ def base_set(name: str, where: str = "") -> str:
         UserError: no such model.
     """
     model, version = split_set(name, where)
-    return BASE_OF[model] + version
+    return base_of(model) + version
 
 
 def _own_and_base(chosen: str, sets: Mapping[str, dict[str, float]], where: str) -> dict[str, float]:
-    """Values of a set; a variant such as ``3state_coop_rigid`` starts from the set of its base, as far as it has use.
+    """Values of a set, started from sets that it can use, as far as it has use for their values.
+
+    A variant such as ``3state_coop_rigid`` starts from the set of its base, one with mechanisms from that without.
 
     Raises:
-        UserError: neither has a set here.
+        UserError: none of these has a set here.
     """
-    base = base_set(chosen, where)
+    base, bare = base_set(chosen, where), chosen.split(SEPARATOR)[0]
     if chosen in sets and base == chosen:
         return sets[chosen]
-    if chosen not in sets and base not in sets:
+    chain = [name for name in dict.fromkeys((base, bare, chosen)) if name in sets]
+    if not chain:
         nor = "" if base == chosen else f", nor has '{base}'"
         raise UserError(f"{where}: model '{chosen}' has no parameter set here{nor}; there are {', '.join(sets)}")
-    model = model_of_set(chosen, where)
-    replaced = set(compose(BASE_OF[model]).parameters) - set(compose(model).parameters)
-    no_use = {row.name for row in replaced}
-    inherited = {name: value for name, value in sets.get(base, {}).items() if name not in no_use}
-    return {**inherited, **sets.get(chosen, {})}
+    wanted = {row.name for row in compose(chosen).parameters}
+    found: dict[str, float] = {}
+    for name in chain:
+        if name == chosen:
+            found.update(sets[name])
+        else:
+            known = {row.name for row in compose(name).parameters}
+            found.update({key: value for key, value in sets[name].items() if key in wanted or key not in known})
+    return found

@@ -131,14 +131,16 @@ def _couplings(e: GridEquations) -> str:
     """How rates of the other states follow the sums of fluxes, and their own states: parts of the Jacobian."""
     results: list[Any] = []
     for i, d in enumerate(e.derivatives):
-        results += [sympy.diff(d, e.symbols[name]) for name in ("kin0", "kin1", "torn_off")]
+        results += [sympy.diff(d, e.symbols[name]) for name in ("kin0", "kin1", "kin2", "torn_off")]
         # Only decay goes on the implicit matrix: growth (thin-filament cooperativity) is left to the error control.
         own = sympy.diff(d, e.symbols[e.states[i].name]) if i < len(e.states) else 0
         results += [own, sympy.diff(d, e.symbols["reattached"])]
     torn = _torn_state(e)
     comes_back = sympy.diff(e.ways.reattach[0].rate, e.symbols[e.states[torn].name]) if torn >= 0 else 0
     results.append(comes_back)
-    doc = "Derivatives of each rate by kin0, kin1, torn-off heads, its own state and returning heads; rate of return."
+    doc = (
+        "Derivatives of each rate by kin0, kin1, kin2, torn-off heads, its own state, returning heads; rate of return."
+    )
     return _scalar_function(e, "couplings", doc, results, SUMS)
 
 

@@ -11,9 +11,10 @@ import sympy
 from xb_muscle_ros.distribution.base import Ways
 from xb_muscle_ros.mechanisms.base import ExponentialRate, Parameter, Quantities, State, StrainRate
 from xb_muscle_ros.mechanisms.ops import Expr
-from xb_muscle_ros.models.composition import INPUTS, Composition, output_expressions, rates
+from xb_muscle_ros.models.assembly import output_expressions, rates, rest_of_states
+from xb_muscle_ros.models.composition import INPUTS, Composition
 
-SUMS = ("q0", "q1", "q2", "kin0", "kin1", "torn_off", "reattached")
+SUMS = ("q0", "q1", "q2", "kin0", "kin1", "kin2", "torn_off", "reattached")
 
 
 @dataclass(frozen=True)
@@ -61,15 +62,13 @@ def grid_equations(model: Composition, smooth: bool) -> GridEquations:
         for expression in shape:
             if sympy.sympify(expression).free_symbols - fixed:
                 raise ValueError(f"model {model.name}: strain dependence {expression} must depend on parameters alone")
-    rest_q = Quantities(symbols, "composition", None)
-    rest = [block.rest(rest_q.for_block(block.name))[s.name] for block in model.blocks for s in block.states]
-    derivatives = [*(parts.others[s.name] for s in model.states), parts.q.ce_velocity]
+    derivatives = [*(parts.others[s.name] for s in model.states), parts.own_velocity]
     return GridEquations(
         states=model.states,
         parameters=model.parameters,
         symbols=symbols,
         ways=parts.ways,
         derivatives=tuple(sympy.sympify(e) for e in derivatives),
-        rest=tuple(sympy.sympify(e) for e in rest),
+        rest=tuple(sympy.sympify(e) for e in rest_of_states(model, symbols)),
         outputs=tuple(sympy.sympify(e) for e in output_expressions(model, parts.q)),
     )

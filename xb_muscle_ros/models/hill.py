@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from xb_muscle_ros.mechanisms.base import Contractile, Mechanism, Parallel, Parameter, Quantities, Series, State
+from xb_muscle_ros.mechanisms.extra import Extra
 from xb_muscle_ros.mechanisms.lumped import Activation, ForceVelocity
 from xb_muscle_ros.mechanisms.ops import Expr
 from xb_muscle_ros.models.composition import COMMON, INPUTS, OUTPUTS, Equations, Model, distinct
@@ -25,11 +26,12 @@ class Hill(Model):
     force_velocity: ForceVelocity
     series: Series
     parallel: Parallel
+    extras: tuple[Extra, ...] = ()
 
     @property
     def blocks(self) -> tuple[Mechanism, ...]:
         """All blocks, in the order in which their states stand."""
-        return (self.activation, self.force_velocity, self.series, self.parallel)
+        return (self.activation, self.force_velocity, self.series, self.parallel, *self.extras)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -39,7 +41,8 @@ class Hill(Model):
     @property
     def states(self) -> tuple[State, ...]:
         """States that are integrated, without the inputs."""
-        return (*self.activation.states, *self.series.length_states)
+        further = (s for extra in self.extras for s in extra.states)
+        return (*self.activation.states, *self.series.length_states, *further)
 
     def equations(self, smooth: bool) -> Equations:
         """Write the model out; there is nothing to smooth."""
@@ -47,8 +50,12 @@ class Hill(Model):
 
         names = [*(s.name for s in self.states), *(i.name for i in INPUTS), *(p.name for p in self.parameters)]
         symbols = {name: sympy.Symbol(name, real=True) for name in names}
-        q = Quantities(symbols, self.name, None)
+        plain = q = Quantities(symbols, self.name, None)
+        for extra in self.extras:
+            q = q.for_block(self.name, **extra.modified(q.for_block(extra.name)))
         level = self.activation.level(q.for_block(self.activation.name))
+        for extra in self.extras:
+            level = level * extra.overlap(q.for_block(extra.name))
         of_relation = q.for_block(self.force_velocity.name)
         element = Contractile(
             force_at=lambda velocity: level * self.force_velocity.force(of_relation, velocity),
@@ -58,6 +65,10 @@ class Hill(Model):
         others = {**self.activation.derivatives(q.for_block(self.activation.name)), **balance.derivatives}
         force_ce = q.Fscale * balance.force
         force_pe = self.parallel.force(q.for_block(self.parallel.name))
+        for extra in self.extras:
+            mine = plain.for_block(extra.name, available_sites=level, ce_velocity=balance.ce_velocity)
+            force_pe = force_pe + extra.force(mine)
+            others.update(extra.derivatives(mine))
         shown: Mapping[str, Expr] = {
             "force_f0": force_ce + force_pe,
             "force_ce_f0": force_ce,
@@ -66,7 +77,9 @@ class Hill(Model):
             "ce_velocity_l0_per_s": balance.ce_velocity / q.gamma,
             "n_on": level,
         }
-        rest = {**self.activation.rest(q.for_block(self.activation.name))}
+        rest: dict[str, Expr] = {}
+        for block in self.blocks:
+            rest.update(block.rest(plain.for_block(block.name)))
         return Equations(
             states=self.states,
             parameters=self.parameters,

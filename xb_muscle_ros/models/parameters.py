@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.mechanisms.base import Parameter
-from xb_muscle_ros.models.registry import METHODS, MODELS, compose
+from xb_muscle_ros.models.registry import EXTRAS, METHODS, MODELS, compose
 
 CONSTANTS: Mapping[str, Parameter] = MappingProxyType(
     {
@@ -29,9 +29,9 @@ def _gather() -> Mapping[str, Parameter]:
     for model in MODELS:
         for row in compose(model).parameters:
             rows.setdefault(row.name, row)
-    for method in METHODS.values():
-        for row in method.parameters:
-            rows.setdefault(row.name, row)
+    further = [method.parameters for method in METHODS.values()] + [extra.parameters for extra in EXTRAS.values()]
+    for row in (row for parameters in further for row in parameters):
+        rows.setdefault(row.name, row)
     return MappingProxyType(rows)
 
 

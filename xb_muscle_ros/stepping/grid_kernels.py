@@ -167,8 +167,8 @@ def evaluate(
     for i in range(bins):
         flux[i] = density[i] - going[i] * n[i]
     torn = torn_sum(tearing, n, bins)
-    kin0, kin1, _ = moments(flux, bins, dx, lowest)
-    return q0, q1, q2, kin0, kin1, torn * dx, back
+    kin0, kin1, kin2 = moments(flux, bins, dx, lowest)
+    return q0, q1, q2, kin0, kin1, kin2, torn * dx, back
 
 
 def torn_sum(tearing: Array, k: Array, bins: int) -> float:
@@ -212,7 +212,7 @@ def attempt(s: Array, h: float, velocity: float, calcium: float, p: Array, out: 
         inverse[i] = 1.0 / (1.0 + gh * going[i])
     for i in range(bins):
         k1[i] *= inverse[i]
-    comes_back = part[5 * (N_OTHERS + 1)]
+    comes_back = part[6 * (N_OTHERS + 1)]
     pivot = 1.0
     returned = 0.0
     if TORN >= 0:
@@ -227,12 +227,12 @@ def attempt(s: Array, h: float, velocity: float, calcium: float, p: Array, out: 
         out[i] = s[i] + h * k1[i]
     for i in range(bins):
         lost[i] = going[i] * k1[i]
-    leave0, leave1, _ = moments(lost, bins, dx, lowest)
+    leave0, leave1, leave2 = moments(lost, bins, dx, lowest)
     leave_torn = torn_sum(tearing, k1, bins) * dx
     for j in range(N_OTHERS + 1):
-        follow_bins = part[5 * j + 2] * leave_torn - part[5 * j] * leave0 - part[5 * j + 1] * leave1
-        follow_bins += (part[5 * j] + part[5 * j + 4]) * comes_back * returned
-        own = min(part[5 * j + 3], 0.0)
+        follow_bins = part[6 * j + 3] * leave_torn - part[6 * j] * leave0 - part[6 * j + 1] * leave1
+        follow_bins += (part[6 * j] + part[6 * j + 5]) * comes_back * returned - part[6 * j + 2] * leave2
+        own = min(part[6 * j + 4], 0.0)
         k1[bins + j] = returned if j == TORN else (rates[j] + gh * follow_bins) / (1.0 - gh * own)
         out[bins + j] = s[bins + j] + h * k1[bins + j]
     y2 = out[bins : bins + N_OTHERS]
@@ -252,14 +252,14 @@ def attempt(s: Array, h: float, velocity: float, calcium: float, p: Array, out: 
         other[i] = k1[i] + k2[i]
     for i in range(bins):
         out[i] = s[i] + h * (k1[i] + 0.5 * other[i])
-    leave0, leave1, _ = moments(lost, bins, dx, lowest)
+    leave0, leave1, leave2 = moments(lost, bins, dx, lowest)
     leave_torn = torn_sum(tearing, k2, bins) * dx
     e0, e1, _ = moments(other, bins, dx, lowest)
     error = max(abs(e0), abs(e1))
     for j in range(N_OTHERS + 1):
-        follow_bins = part[5 * j + 2] * leave_torn - part[5 * j] * leave0 - part[5 * j + 1] * leave1
-        follow_bins += (part[5 * j] + part[5 * j + 4]) * comes_back * returned
-        own = min(part[5 * j + 3], 0.0)
+        follow_bins = part[6 * j + 3] * leave_torn - part[6 * j] * leave0 - part[6 * j + 1] * leave1
+        follow_bins += (part[6 * j] + part[6 * j + 5]) * comes_back * returned - part[6 * j + 2] * leave2
+        own = min(part[6 * j + 4], 0.0)
         k2[bins + j] = returned if j == TORN else (rates2[j] - 2.0 * k1[bins + j] + gh * follow_bins) / (1.0 - gh * own)
         error = max(error, abs(k1[bins + j] + k2[bins + j]))
         out[bins + j] = s[bins + j] + h * (1.5 * k1[bins + j] + 0.5 * k2[bins + j])

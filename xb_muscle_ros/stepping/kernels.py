@@ -124,6 +124,7 @@ def advance(
             t = dt if h == rest else t + h
             for i in range(n - 3):
                 here[i] = trial[i]
+            here[n - 3] = s[n - 3] + velocity * t
             regrid(here, p, work)
             grown = h * growth(error, tol)
             # A step cut short by the end of the interval says little about the next one.
@@ -234,6 +235,7 @@ def follow(
         velocity = (length[k] - length[k - 1]) / dt
         t = 0.0
         in_interval = 0
+        here[n - 3] = length[k - 1]
         while t < dt:
             stop = dt
             if not INTERPOLATED and next_sample < samples and sample[next_sample] - begin < dt:
@@ -268,6 +270,7 @@ def follow(
             ):
                 until += 1
             if INTERPOLATED and until > next_sample:
+                there[n - 3] = length[k - 1] + velocity * (t + h)
                 slope(here, velocity, calcium[k], p, before)
                 slope(there, velocity, calcium[k], p, after)
             for j in range(next_sample, until):
@@ -290,6 +293,7 @@ def follow(
                 here[i] = there[i]
             regrid(here, p, work)
             t = end
+            here[n - 3] = length[k - 1] + velocity * t
             grown = h * growth(error, tol)
             # A step cut short by a corner or a sample says little about the next one.
             h = max(grown, wanted) if landed else grown

@@ -13,7 +13,7 @@ JF = Parameter("JF", "1", "increase of J1 per cross-bridge force", 0.0, 1e6, Non
 
 
 class ForceDependentThickFilament(ThickFilament):
-    """dD = J1 (1 + JF F+) S - J2 D - (dQ0 + dR by kinetics), with S = 1 - Q0 - D - R super-relaxed."""
+    """dD = J1 (1 + JF F+ + recruitment) S - J2 D - (dQ0 + dR by kinetics), with S = 1 - Q0 - D - R super-relaxed."""
 
     name = "force_dependent"
     parameters = (J1, J2, JF)
@@ -30,5 +30,5 @@ class ForceDependentThickFilament(ThickFilament):
     def derivatives(self, q: Quantities) -> Mapping[str, Expr]:
         """See the class."""
         super_relaxed = 1 - q.q0 - q.drx - q.forcibly_detached
-        recruit = q.J1 * (1 + q.JF * q.positive(q.force_xb)) * super_relaxed
+        recruit = q.J1 * (1 + q.JF * q.positive(q.force_xb) + q.recruitment) * super_relaxed
         return {"drx": recruit - q.J2 * q.drx - q.attachment_rate_net}

@@ -1,0 +1,107 @@
+"""Mechanisms that come on top of a model: any number of them, each changing the model in one of a few ways."""
+
+from __future__ import annotations
+
+import enum
+from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from typing import ClassVar, NamedTuple
+
+from xb_muscle_ros.mechanisms.base import Family, Mechanism, Quantities, StrainRate
+from xb_muscle_ros.mechanisms.ops import Expr
+
+
+class Needs(enum.Enum):
+    """What a model must have for a mechanism to act on; the value says it in words."""
+
+    NOTHING = "nothing"
+    HEADS = "heads that attach and detach"
+    SUPER_RELAXED = "super-relaxed heads"
+
+
+class HeadMoments(NamedTuple):
+    """Zeroth to second moment over strain of heads, or of heads per second."""
+
+    m0: Expr
+    m1: Expr
+    m2: Expr
+
+
+class Extra(Mechanism):
+    """A mechanism beside the families. Every hook's default changes nothing.
+
+    Class attributes:
+        needs: what the model must have.
+    """
+
+    family = Family.EXTRA
+    needs: ClassVar[Needs] = Needs.NOTHING
+
+    def force(self, q: Quantities) -> Expr:
+        """Force beside the contractile and the parallel element, F0."""
+        return 0
+
+    def modified(self, q: Quantities) -> Mapping[str, Expr]:
+        """Other values for parameters and inputs, by name; the model's blocks see these in place of their own."""
+        return {}
+
+    def overlap(self, q: Quantities) -> Expr:
+        """Share of the available sites that heads can reach, 1 at rest length."""
+        return 1
+
+    def detachment(self, q: Quantities) -> tuple[StrainRate, ...]:
+        """Further rates at which attached heads detach to the ready state."""
+        return ()
+
+    def head_force(self, q: Quantities, m: HeadMoments) -> Expr:
+        """What heads bear beyond Q0 + Q1, from their moments; linear in these, so that rates may stand for heads."""
+        return 0
+
+    def derivatives(self, q: Quantities) -> Mapping[str, Expr]:
+        """Rates of change of the block's own states, 1/s; ``q.ce_velocity`` (power strokes/s) is among the names."""
+        return {}
+
+
+class Unit(NamedTuple):
+    """One half-sarcomere's heads.
+
+    Attributes:
+        force: they bear, power-stroke units.
+        force_rate: of that by attachment and detachment alone, 1/s.
+        stiffness: force per power stroke.
+    """
+
+    force: Expr
+    force_rate: Expr
+    stiffness: Expr
+
+
+class Chain(NamedTuple):
+    """A chain of half-sarcomeres as the series element sees it, and how it shares out the movement.
+
+    Attributes:
+        force, force_rate, stiffness: of the chain; see `Unit`.
+        own_velocity, other_velocity: of either half-sarcomere from that of the chain, power strokes/s.
+        derivatives: rates of the mechanism's states from that velocity.
+    """
+
+    force: Expr
+    force_rate: Expr
+    stiffness: Expr
+    own_velocity: Callable[[Expr], Expr]
+    other_velocity: Callable[[Expr], Expr]
+    derivatives: Callable[[Expr], Mapping[str, Expr]]
+
+
+class InSeries(Extra):
+    """A mechanism that puts another half-sarcomere in series with the model's own.
+
+    The other one has the same blocks; its states go by the same names with `PREFIX` before them.
+    """
+
+    PREFIX: ClassVar[str] = "other_"
+    needs = Needs.HEADS
+
+    @abstractmethod
+    def chain(self, q: Quantities, own: Unit, other: Unit) -> Chain:
+        """Force balance of the chain."""

@@ -1,0 +1,37 @@
+"""Active titin: it takes hold of actin when calcium comes, and is a spring from there on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from xb_muscle_ros.mechanisms.base import Parameter, Quantities, State
+from xb_muscle_ros.mechanisms.extra import Extra
+from xb_muscle_ros.mechanisms.ops import Expr
+
+_SOURCE = "Millard, Franklin and Herzog 2024; this package"
+STIFFNESS = Parameter("titin_stiffness", "F0/L0", "stiffness of titin held by actin", 0.0, 100.0, 0.0, _SOURCE)
+RELEASE = Parameter("titin_release", "1/s", "rate at which titin lets go without calcium", 0.0, 1e4, 10.0, _SOURCE)
+HALF = Parameter("titin_calcium", "µM", "calcium at which half of the titin holds on", 1e-3, 1e3, 1.0, _SOURCE)
+
+
+class ActiveTitin(Extra):
+    """F = k g x+ with x' = v - release (1 - g) x and g = Ca/(Ca + Ca_half).
+
+    x is the stretch since titin took hold: it follows the fibre while calcium holds titin to actin and is forgotten
+    without. Shortened below where it took hold titin is slack.
+    """
+
+    name = "active_titin"
+    parameters = (STIFFNESS, RELEASE, HALF)
+    states = (State("titin_stretch", "L0", "stretch since titin took hold of actin", -100.0, 100.0),)
+
+    def force(self, q: Quantities) -> Expr:
+        """See the class."""
+        return q.titin_stiffness * self._held(q) * q.positive(q.titin_stretch)
+
+    def derivatives(self, q: Quantities) -> Mapping[str, Expr]:
+        """See the class."""
+        return {"titin_stretch": q.velocity - q.titin_release * (1 - self._held(q)) * q.titin_stretch}
+
+    def _held(self, q: Quantities) -> Expr:
+        return q.calcium / (q.calcium + q.titin_calcium)

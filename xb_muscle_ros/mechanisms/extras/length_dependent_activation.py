@@ -1,0 +1,26 @@
+"""Length-dependent activation: a longer fibre is more sensitive to calcium."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from xb_muscle_ros.mechanisms import ops
+from xb_muscle_ros.mechanisms.base import Parameter, Quantities
+from xb_muscle_ros.mechanisms.extra import Extra
+from xb_muscle_ros.mechanisms.ops import Expr
+
+SENSITIVITY = Parameter(
+    "calcium_per_length", "1/L0", "relative rise of calcium sensitivity with length", -50.0, 50.0, 0.0,
+    "Stephenson and Williams 1982; this package",
+)  # fmt: skip
+
+
+class LengthDependentActivation(Extra):
+    """The thin filament sees Ca exp(alpha ΔL): pCa50 rises by alpha/ln 10 per L0."""
+
+    name = "length_dependent_activation"
+    parameters = (SENSITIVITY,)
+
+    def modified(self, q: Quantities) -> Mapping[str, Expr]:
+        """See the class."""
+        return {"calcium": q.calcium * ops.exp(q.calcium_per_length * q.length_change)}

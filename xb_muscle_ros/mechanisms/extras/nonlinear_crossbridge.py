@@ -1,0 +1,24 @@
+"""Non-linear cross-bridges: a head's force bends away from its strain."""
+
+from __future__ import annotations
+
+from xb_muscle_ros.mechanisms.base import Parameter, Quantities
+from xb_muscle_ros.mechanisms.extra import Extra, HeadMoments, Needs
+from xb_muscle_ros.mechanisms.ops import Expr
+
+CURVATURE = Parameter(
+    "head_curvature", "1", "curvature of a head's force over strain: stiffer stretched, softer compressed", -0.3, 0.5,
+    0.0, "Kaya and Higuchi 2010; this package",
+)  # fmt: skip
+
+
+class NonlinearCrossbridge(Extra):
+    """A head at strain x bears (1 + x) + epsilon (1 + x)²; all heads Q0 + Q1 + epsilon (Q0 + 2 Q1 + Q2)."""
+
+    name = "nonlinear_crossbridge"
+    needs = Needs.HEADS
+    parameters = (CURVATURE,)
+
+    def head_force(self, q: Quantities, m: HeadMoments) -> Expr:
+        """See the class."""
+        return q.head_curvature * (m.m0 + 2 * m.m1 + m.m2)
