@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from xb_muscle_ros.errors import StateViolation
+from xb_muscle_ros.models.assembly import equations
 from xb_muscle_ros.models.codegen import c_text, module_text
-from xb_muscle_ros.models.composition import equations
 from xb_muscle_ros.models.elimination import Elimination
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
