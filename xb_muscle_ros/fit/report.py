@@ -36,8 +36,8 @@ _TWINS = 0.95
 _SAME = 0.05
 # So much of the way between its bounds counts as at a bound.
 _AT_BOUND = 1e-3
-# Sums over bins h apart miss a normal density of standard deviation w by 2 exp(-2 (pi w / h)^2): at 1.2 by 2e-6.
-_WIDEST_BIN = 1.2
+# Sums over bins h apart miss a normal density of standard deviation w by 2 exp(-2 (pi w / h)^2): at 1.25 by 7e-6.
+_WIDEST_BIN = 1.25
 
 
 def trial_rows(fitted: Fitted) -> list[dict[str, Any]]:
