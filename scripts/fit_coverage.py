@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import time
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -34,34 +35,42 @@ PCAS = (4.5, 6.1, 6.2, 6.3, 6.4, 6.6)
 TRAINING = ((0.0383, 0.1), (0.0, 0.001))
 HELD_OUT = ((0.0383, 0.001), (0.0121, 0.316), (0.0682, 0.01))
 CHANGE = 0.15
-GRID = {"bins": 101.0, "strain_range": 15.0, "regrid": 1.0}
+# By the grid the truth is made more finely than it is fitted (200 bins, the default, one step per sample).
+FITTED_GRID = {"bins": 200.0, "strain_range": 15.0, "regrid": 1.0}
+TRUE_GRID = {**FITTED_GRID, "bins": 301.0}
+TRUE_SUBSTEPS = 4
 
 
 def case(task: dict[str, Any]) -> dict[str, Any]:
     """One made fibre, fitted; errors and intervals."""
     random = np.random.default_rng(task["seed"])
     released = load_fibre(FIBRES[task["seed"] % len(FIBRES)])
-    values = {**released.values, "smoothing": 0.0}
+    values = {**released.values, "smoothing": task["smoothing"] * released.values["smoothing"]}
     start = replace(released, values=MappingProxyType(values))
     names = [n for n in FITTED if n in values]
     true = {**values, **{n: values[n] * float(np.exp(CHANGE * random.normal())) for n in names}}
     if task["truth"] != "gaussian":
-        true |= GRID
+        true |= TRUE_GRID
     if task["method"] != "gaussian":
-        start = replace(start, method=task["method"], values=MappingProxyType({**values, **GRID}))
+        start = replace(start, method=task["method"], values=MappingProxyType({**values, **FITTED_GRID}))
     truth = replace(start, values=MappingProxyType(true), method=task["truth"])
     muscle = Muscle(truth)
     trials, held = [], []
+    substeps = 1 if task["truth"] == "gaussian" else TRUE_SUBSTEPS
     for protocols, out in ((TRAINING, False), (HELD_OUT, True)):
         for amplitude, recovery in protocols:
             for pca in task["pcas"]:
-                trials.append(made(muscle, StretchShortenStretch(amplitude, recovery).trial("made", pca), random))
+                given = StretchShortenStretch(amplitude, recovery).trial("made", pca)
+                trials.append(made(muscle, given, random, substeps=substeps))
                 held.append(out)
     # Nothing but the data may say where the truth lies: no priors.
     choices = {n: Choice(prior_sd=float("inf")) for n in names}
     problem = Problem(start, fit_trials(trials, held), parameter_coordinates(start, None, (), {}, choices), {})
     settings = Settings(starts=1, level=0.95 if task["intervals"] else None)
-    found = as_json(fit(problem, settings, Options(processes=0, quiet=True)), {})
+    begin = time.perf_counter()
+    fitted = fit(problem, settings, Options(processes=0, quiet=True))
+    seconds = time.perf_counter() - begin
+    found = as_json(fitted, {})
     rows = [
         {
             "name": row["name"],
@@ -73,7 +82,7 @@ def case(task: dict[str, Any]) -> dict[str, Any]:
         }
         for row in found["parameters"]
     ]
-    clean = [made(muscle, t, random, 0.0).measured_f0 for t, h in zip(trials, held, strict=True) if h]
+    clean = [made(muscle, t, random, 0.0, substeps).measured_f0 for t, h in zip(trials, held, strict=True) if h]
     force = [f for f, t in zip(problem.predicted(_point(problem, rows)), problem.trials, strict=True) if t.held_out]
     inside = [np.isin(t.time_s, p.force_time_s) for t, p in _pairs(trials, problem) if p.held_out]
     errors = [float(np.sqrt(np.mean((a - b[i]) ** 2))) for a, b, i in zip(force, clean, inside, strict=True)]
@@ -83,6 +92,8 @@ def case(task: dict[str, Any]) -> dict[str, Any]:
         "heldout_rmsd_f0": found["heldout_rmsd_f0"],
         "heldout_error_f0": float(np.sqrt(np.mean(np.square(errors)))),
         "parameters": rows,
+        "mismatch_f0": fitted.mismatch_f0,
+        "seconds": seconds,
         "warnings": found["warnings"],
     }
 
@@ -107,6 +118,8 @@ def main(cases: int, shared: dict[str, Any], out: Path, journal: Path | None) ->
     print(
         f"held-out error, noise left out: median {100 * np.median(error):.3f} %, largest {100 * error.max():.3f} % F0"
     )
+    seconds = np.array([c["seconds"] for c in done])
+    print(f"seconds per fit, one process: median {np.median(seconds):.1f}, most {seconds.max():.1f}")
     if not shared["intervals"]:
         return
     total, inside = 0, 0
@@ -127,9 +140,11 @@ if __name__ == "__main__":
     parser.add_argument("--truth", choices=("gaussian", "characteristics"), default="gaussian")
     parser.add_argument("--method", choices=("gaussian", "characteristics"), default="gaussian", help="of the fit")
     parser.add_argument("--pca", nargs="+", type=float, default=list(PCAS))
+    parser.add_argument("--smooth", action="store_true", help="truth and fit with the released sets' smoothing")
     parser.add_argument("--no-intervals", action="store_true")
     parser.add_argument("--out", type=Path, default=Path("out/coverage.json"))
     parser.add_argument("--journal", type=Path)
     given = parser.parse_args()
     chosen = {"truth": given.truth, "method": given.method, "pcas": given.pca, "intervals": not given.no_intervals}
+    chosen["smoothing"] = float(given.smooth)
     main(given.cases, chosen, given.out, given.journal)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit import descents
 from xb_muscle_ros.fit import run as fit_run
 from xb_muscle_ros.fit.coordinates import Choice, fault_coordinates, parameter_coordinates
 from xb_muscle_ros.fit.data import fit_trials
@@ -89,7 +90,7 @@ def test_interrupted_fit_goes_on_where_it_was(
 ) -> None:
     options = replace(HERE, journal=tmp_path / "journal.jsonl")
     count = 0
-    descend = fit_run.descend
+    descend = descents.descend
 
     def interrupted(*arguments: object) -> object:
         nonlocal count
@@ -98,7 +99,7 @@ def test_interrupted_fit_goes_on_where_it_was(
             raise KeyboardInterrupt
         return descend(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(fit_run, "descend", interrupted)
+    monkeypatch.setattr(descents, "descend", interrupted)
     with pytest.raises(KeyboardInterrupt):
         fit(problem, Settings(starts=2), options)
     found = fit(problem, Settings(starts=2), options)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.fit import features
 from xb_muscle_ros.fit.coordinates import Coordinate, from_json, to_json
+from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.fit.features import Feature
 from xb_muscle_ros.measurement.faults import FAULTS, Scope
@@ -32,6 +33,7 @@ class Problem:
         coordinates: what is moved.
         ties: parameter -> parameter whose value it takes.
         features: numbers to meet beside the traces; training and held-out ones.
+        correction: what is added to the model's forces and features, or None.
     """
 
     fibre: Fibre
@@ -39,6 +41,7 @@ class Problem:
     coordinates: tuple[Coordinate, ...]
     ties: Mapping[str, str]
     features: tuple[Feature, ...] = ()
+    correction: Correction | None = None
 
     @property
     def start(self) -> Array:
@@ -69,17 +72,26 @@ class Problem:
             if c.group is not None and touches(c, trial)
         }
 
-    def true_force(self, muscle: Muscle, z: Array, trial: FitTrial) -> Array:
-        """The fibre's force at the trial's samples, F0, before the recording's faults.
+    def true_forces(self, muscle: Muscle, z: Array, trials: Sequence[FitTrial]) -> list[Array]:
+        """The fibre's force at the samples of trials, F0, before the recording's faults.
 
         Raises:
             UserError, StateViolation: see `Muscle.settle` and `Muscle.run`.
         """
-        faults = self.faults_at(z, trial)
-        length = given_length(trial.length_l0, faults)
-        calcium = given_calcium(trial.calcium_um, faults)
-        state = muscle.settle(float(length[0]), float(calcium[0]))
-        return muscle.outputs_of(muscle.run(state, trial.dt_s, length, calcium))["force_f0"]
+        settled: dict[tuple[float, float], Array] = {}
+        found = []
+        for trial in trials:
+            faults = self.faults_at(z, trial)
+            length = given_length(trial.length_l0, faults)
+            calcium = given_calcium(trial.calcium_um, faults)
+            # Trials that begin alike settle alike, which on a strain grid is most of the work.
+            begin = (float(length[0]), float(calcium[0]))
+            if begin not in settled:
+                settled[begin] = muscle.settle(*begin)
+            states = muscle.run(settled[begin], trial.dt_s, length, calcium)
+            force = muscle.outputs_of(states)["force_f0"]
+            found.append(force if self.correction is None else force + self.correction.of_trial(trial.name, z))
+        return found
 
     def recorded(self, z: Array, trial: FitTrial, force_f0: Array) -> Array:
         """Force as the file would hold it, at the times that count."""
@@ -90,11 +102,11 @@ class Problem:
         """Recorded force of trials (default: all) at a point, F0.
 
         Raises:
-            UserError, StateViolation: see `true_force`.
+            UserError, StateViolation: see `true_forces`.
         """
-        muscle = Muscle(self.fibre_at(z))
         chosen = self.trials if trials is None else trials
-        return [self.recorded(z, trial, self.true_force(muscle, z, trial)) for trial in chosen]
+        forces = self.true_forces(Muscle(self.fibre_at(z)), z, chosen)
+        return [self.recorded(z, trial, force) for trial, force in zip(chosen, forces, strict=True)]
 
     def solution_shifts(self, z: Array) -> dict[float, float]:
         """Fitted pCa shift of each solution by stated pCa; features meet the solutions that the trials met."""
@@ -120,6 +132,7 @@ class Problem:
             "coordinates": to_json(self.coordinates),
             "ties": dict(self.ties),
             "features": features.to_json(self.features),
+            "correction": None if self.correction is None else self.correction.to_json(),
         }
 
     @staticmethod
@@ -136,6 +149,7 @@ class Problem:
             coordinates=from_json(row["coordinates"]),
             ties=row["ties"],
             features=features.from_json(row["features"]),
+            correction=None if row["correction"] is None else Correction.from_json(row["correction"]),
         )  # fmt: skip
 
 
@@ -145,3 +159,8 @@ def touches(c: Coordinate, trial: FitTrial) -> bool:
         return True
     scope = FAULTS[c.name].scope
     return c.group == {Scope.TRIAL: trial.name, Scope.SOLUTION: trial.solution, Scope.STUDY: ""}[scope]
+
+
+def moves_simulation(c: Coordinate) -> bool:
+    """Whether a coordinate bears on what the fibre does, or on its recording alone."""
+    return c.group is None or FAULTS[c.name].on_input

@@ -17,6 +17,7 @@ from xb_muscle_ros.files import write_text
 from xb_muscle_ros.fit.calibration import calibrated_force
 from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.fit.data import FitTrial
+from xb_muscle_ros.fit.methods import fast_form
 from xb_muscle_ros.fit.problem import Problem, touches
 from xb_muscle_ros.fit.run import Fitted
 from xb_muscle_ros.fit.training import Training
@@ -35,6 +36,8 @@ _TWINS = 0.95
 _SAME = 0.05
 # So much of the way between its bounds counts as at a bound.
 _AT_BOUND = 1e-3
+# Sums over bins h apart miss a normal density of standard deviation w by 2 exp(-2 (pi w / h)^2): at 1.25 by 7e-6.
+_WIDEST_BIN = 1.25
 
 
 def trial_rows(fitted: Fitted) -> list[dict[str, Any]]:
@@ -157,8 +160,31 @@ def warnings(fitted: Fitted) -> list[str]:
         found.append(f"{lost} of {len(fitted.starts)} starts led nowhere, because the model has no solution there")
     if not fitted.best.converged:
         found.append("the descent was cut short before it came to rest; start again from the file it wrote")
+    found += _of_grid(fitted)
     if not fitted.settled:
         found.append("profiles went on finding better points: the minimum is not settled; give more starts")
+    return found
+
+
+def _of_grid(fitted: Fitted) -> list[str]:
+    """What the strain grid of a fit leaves to be desired."""
+    problem, found = fitted.problem, []
+    fibre = problem.fibre_at(fitted.best.z)
+    if fast_form(problem) is problem:
+        return []
+    width = 2.0 * fibre.values["strain_range"] / (fibre.values["bins"] - 1.0)
+    attaching = fibre.values["w"]
+    if width > _WIDEST_BIN * attaching:
+        enough = math.ceil(2.0 * fibre.values["strain_range"] / (_WIDEST_BIN * attaching)) + 1
+        found.append(
+            f"strain bins of {width:.2g} power strokes are too wide for heads that attach with an sd of "
+            f"{attaching:.2g}: forces err in jumps of up to some 0.1 % F0; use --set bins={enough} or more"
+        )
+    if not fitted.correction_settled:
+        found.append(
+            f"the fit by {fibre.method} did not settle: the corrected Gaussian form is {fitted.mismatch_f0:.1g} F0 off;"
+            " start again from the file it wrote"
+        )
     return found
 
 
@@ -178,6 +204,7 @@ def as_json(fitted: Fitted, provenance: Mapping[str, Any]) -> dict[str, Any]:
         "cost": fitted.best.cost,
         "converged": fitted.best.converged,
         "settled": fitted.settled,
+        "mismatch_f0": fitted.mismatch_f0,
         "scale": fitted.scale._asdict(),
         "train_rmsd_f0": mean_rmsd(rows, False, "rmsd_f0"),
         "heldout_rmsd_f0": mean_rmsd(rows, True, "rmsd_f0"),

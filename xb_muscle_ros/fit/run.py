@@ -11,10 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.descents import solution_from_json, solution_to_json, start_task
 from xb_muscle_ros.fit.features import F0_ANCHOR
-from xb_muscle_ros.fit.noise import FIRST, Scale, scale_of
+from xb_muscle_ros.fit.methods import fast_form
+from xb_muscle_ros.fit.noise import FIRST, Scale
 from xb_muscle_ros.fit.problem import Problem
-from xb_muscle_ros.fit.solve import Objective, Solution, descend
+from xb_muscle_ros.fit.rounds import CLOSE_F0, refined
+from xb_muscle_ros.fit.solve import Objective, Solution
 from xb_muscle_ros.fit.training import Training, finite_start
 from xb_muscle_ros.fit.uncertainty import Curvature, Side, curvature, profile_side
 from xb_muscle_ros.progress import Progress
@@ -56,6 +59,8 @@ class Fitted:
         shape: curvature and covariance at the best point.
         sides: lower and upper end of each model parameter's interval, by its index; empty without a level.
         settled: False where profiles went on finding better points.
+        mismatch_f0: of a method other than the Gaussian form, how far the corrected Gaussian form is from it at the
+            best point (root mean square, F0); see `rounds`.
     """
 
     problem: Problem
@@ -66,10 +71,19 @@ class Fitted:
     shape: Curvature
     sides: Mapping[int, tuple[Side, Side]]
     settled: bool
+    mismatch_f0: float = 0.0
+
+    @property
+    def correction_settled(self) -> bool:
+        """Whether the best point is one of the method's own."""
+        return self.mismatch_f0 <= CLOSE_F0
 
 
 def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
     """Find the best point from several starts, and how well it is known.
+
+    By a method other than the Gaussian form, starts descend by the Gaussian form, the best one goes on to the method's
+    own best point (see `rounds`), and profiles are those of the corrected Gaussian form.
 
     Args:
         problem: trials and coordinates.
@@ -81,48 +95,37 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
     """
     if not problem.coordinates:
         raise UserError("nothing is free to be fitted; name parameters with --free or faults with --nuisance")
-    training = Training(problem)
+    fast = fast_form(problem)
+    training = Training(fast)
     # What every fibre meets by definition is nothing to fit to.
     if not training.trials and all(f == F0_ANCHOR for f in training.features):
         raise UserError(f"all {len(problem.trials)} trials are held out or weigh nothing; leave at least one to fit to")
     finite_start(training)
-    plain = problem.to_json()
+    plain = fast.to_json()
     tasks = [{"problem": plain, "z": z.tolist(), "scale": list(FIRST)} for z in _starts(problem, settings)]
     starts = _descended(tasks, options)
-    found = [s for s in starts if s is not None]
-    best, scale = min(found, key=lambda s: s.cost), FIRST
+    best = min((s for s in starts if s is not None), key=lambda s: s.cost)
     sides: dict[int, tuple[Side, Side]] = {}
     settled = False
     for _ in range(_RESTARTS):
-        best, scale = _polished(plain, training, best, options)
-        shape = curvature(Objective(training, scale), best.z)
+        found = refined(problem, best, options)
+        best, scale = found.best, found.scale
+        shape = curvature(Objective(Training(found.problem), scale), best.z)
         if settings.level is None:
             settled = True
             break
-        sides, better = _profiles(plain, problem, best, scale, settings.level, options)
+        sides, better = _profiles(found.problem, best, scale, settings.level, options)
         settled = better is None
         if better is None:
             break
         best = best._replace(z=better)
-    return Fitted(problem, settings, best, scale, tuple(starts), shape, sides, settled)
-
-
-def start_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
-    """One descent; None where the model has no solution at its start, from where nothing tells which way to go."""
-    objective = Objective(Training(Problem.from_json(task["problem"])), Scale(*task["scale"]))
-    z = np.array(task["z"])
-    try:
-        objective.training.force(z)
-        objective.training.feature_distance(z)
-    except UserError:
-        return None
-    return _solution_to_json(descend(objective, z))
+    return Fitted(problem, settings, best, scale, tuple(starts), shape, sides, settled, found.mismatch_f0)
 
 
 def profile_task(task: Mapping[str, Any]) -> dict[str, Any]:
     """One side of one profile."""
     objective = Objective(Training(Problem.from_json(task["problem"])), Scale(*task["scale"]))
-    best = _solution_from_json(task["best"])
+    best = solution_from_json(task["best"])
     shape = curvature(objective, best.z)
     return profile_side(objective, best, task["index"], task["up"], shape, task["level"])._asdict()
 
@@ -145,7 +148,7 @@ def _descended(tasks: Sequence[Mapping[str, Any]], options: Options) -> list[Sol
     for index, row in stream(start_task, tasks, replace(options, label="starts")):
         if row is None:
             continue
-        found[index] = solution = _solution_from_json(row)
+        found[index] = solution = solution_from_json(row)
         if solution.cost < best:
             best = solution.cost
             if not options.quiet:
@@ -156,33 +159,14 @@ def _descended(tasks: Sequence[Mapping[str, Any]], options: Options) -> list[Sol
     return found
 
 
-def _polished(plain: Mapping[str, Any], training: Training, best: Solution, options: Options) -> tuple[Solution, Scale]:
-    """The best point under the scale that the residuals turn out to have."""
-    residual = training.force(best.z) - training.measured
-    scale = scale_of([residual[s] for s in training.slices()], best.z.size)
-    task = {"problem": plain, "z": best.z.tolist(), "scale": list(scale)}
-    row = run(start_task, [task], replace(options, label="polish", processes=0 if options.scheduler is None else None))[
-        0
-    ]
-    return (best if row is None else _solution_from_json(row)), scale
-
-
 def _profiles(
-    plain: Mapping[str, Any], problem: Problem, best: Solution, scale: Scale, level: float, options: Options
+    problem: Problem, best: Solution, scale: Scale, level: float, options: Options
 ) -> tuple[dict[int, tuple[Side, Side]], Array | None]:
     """Both sides of every model parameter's profile, or a better point that one of them met."""
     chosen = [j for j, c in enumerate(problem.coordinates) if c.group is None]
-    task = {"problem": plain, "best": _solution_to_json(best), "scale": list(scale), "level": level}
+    task = {"problem": problem.to_json(), "best": solution_to_json(best), "scale": list(scale), "level": level}
     tasks = [{**task, "index": j, "up": up} for j in chosen for up in (False, True)]
     rows = run(profile_task, tasks, replace(options, label="profiles"))
     sides = [Side(r["end"], r["closed"], [(x, y) for x, y in r["points"]], r["better"]) for r in rows]
     better = next((np.array(side.better) for side in sides if side.better is not None), None)
     return {j: (sides[2 * k], sides[2 * k + 1]) for k, j in enumerate(chosen)}, better
-
-
-def _solution_to_json(s: Solution) -> dict[str, Any]:
-    return {**s._asdict(), "z": s.z.tolist()}
-
-
-def _solution_from_json(row: Mapping[str, Any]) -> Solution:
-    return Solution(**{**row, "z": np.array(row["z"])})

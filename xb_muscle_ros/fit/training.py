@@ -8,7 +8,7 @@ import numpy.typing as npt
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit import features
 from xb_muscle_ros.fit.coordinates import Coordinate
-from xb_muscle_ros.fit.problem import Problem, touches
+from xb_muscle_ros.fit.problem import Problem, moves_simulation, touches
 from xb_muscle_ros.measurement.faults import FAULTS
 from xb_muscle_ros.models.muscle import Muscle
 
@@ -38,9 +38,9 @@ class Training:
         """Recorded force of all training trials, concatenated, F0.
 
         Raises:
-            UserError, StateViolation: see `Problem.true_force`.
+            UserError, StateViolation: see `Problem.true_forces`.
         """
-        true = self._true(z)
+        true = self.true_forces(z)
         found = [self.problem.recorded(z, t, f) for t, f in zip(self.trials, true, strict=True)]
         return np.concatenate([*found, np.empty(0)])
 
@@ -54,13 +54,19 @@ class Training:
             return np.empty(0)
         found = features.simulated(Muscle(self.problem.fibre_at(z)), self.features, self.problem.solution_shifts(z))
         distance: Array = (found - [f.value for f in self.features]) / [f.sd for f in self.features]
-        return distance
+        correction = self.problem.correction
+        return distance if correction is None else distance + correction.of_features(z)
 
-    def _true(self, z: Array) -> list[Array]:
+    def true_forces(self, z: Array) -> list[Array]:
+        """The fibre's force in each training trial before the recording's faults, F0.
+
+        Raises:
+            UserError, StateViolation: see `Problem.true_forces`.
+        """
         key = z.tobytes()
         if self._at is None or self._at[0] != key:
             muscle = Muscle(self.problem.fibre_at(z))
-            self._at = (key, [self.problem.true_force(muscle, z, t) for t in self.trials])
+            self._at = (key, self.problem.true_forces(muscle, z, self.trials))
         return self._at[1]
 
     def slopes(self, z: Array) -> tuple[Array, Array]:
@@ -71,11 +77,11 @@ class Training:
         Returns:
             shapes (samples, coordinates) and (features, coordinates).
         """
-        true, force, distance = self._true(z), self.force(z), self.feature_distance(z)
+        true, force, distance = self.true_forces(z), self.force(z), self.feature_distance(z)
         upper = self.problem.bounds[1]
         of_force, of_features = np.zeros((force.size, z.size)), np.zeros((distance.size, z.size))
         for j, c in enumerate(self.problem.coordinates):
-            step = _STEP if c.group is None else _STEP * FAULTS[c.name].sd / 0.05
+            step = step_of(c, _STEP)
             for signed in (-step, step) if z[j] + step > upper[j] else (step, -step):
                 moved = z.copy()
                 moved[j] += signed
@@ -91,14 +97,19 @@ class Training:
     def _stepped(self, moved: Array, c: Coordinate, true: list[Array], base: Array) -> Array:
         """Recorded force with one coordinate moved; only what it bears on is computed again."""
         problem = self.problem
-        again = c.group is None or FAULTS[c.name].on_input
-        muscle = Muscle(problem.fibre_at(moved)) if again else None
-        out = base.copy()
-        for trial, force, here in zip(self.trials, true, self.slices(), strict=True):
-            if touches(c, trial):
-                simulated = force if muscle is None else problem.true_force(muscle, moved, trial)
-                out[here] = problem.recorded(moved, trial, simulated)
+        touched = [k for k, trial in enumerate(self.trials) if touches(c, trial)]
+        forces = [true[k] for k in touched]
+        if moves_simulation(c):
+            forces = problem.true_forces(Muscle(problem.fibre_at(moved)), moved, [self.trials[k] for k in touched])
+        out, places = base.copy(), self.slices()
+        for k, force in zip(touched, forces, strict=True):
+            out[places[k]] = problem.recorded(moved, self.trials[k], force)
         return out
+
+
+def step_of(c: Coordinate, step: float) -> float:
+    """Step of a slope in a coordinate, from that of a parameter on a logarithmic scale."""
+    return step if c.group is None else step * FAULTS[c.name].sd / 0.05
 
 
 def finite_start(training: Training) -> None:

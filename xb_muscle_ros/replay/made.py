@@ -36,7 +36,12 @@ def coloured_noise(random: np.random.Generator, n: int, sd: float = NOISE_SD_F0,
 
 
 def made(
-    muscle: Muscle, trial: Trial, random: np.random.Generator, noise_sd_f0: float = NOISE_SD_F0, **faults: float
+    muscle: Muscle,
+    trial: Trial,
+    random: np.random.Generator,
+    noise_sd_f0: float = NOISE_SD_F0,
+    substeps: int = 1,
+    **faults: float,
 ) -> Trial:
     """A trial with measured force that a fibre and a faulty measurement made.
 
@@ -45,6 +50,7 @@ def made(
         trial: what it is said to be given.
         random: of the noise.
         noise_sd_f0: standard deviation of the noise, F0.
+        substeps: steps of the fibre between two samples.
         faults: values by name of `measurement.faults.FAULTS`.
 
     Raises:
@@ -56,6 +62,6 @@ def made(
         length_m=length * trial.facts.reference_length_m,
         calcium_um=given_calcium(trial.calcium_um, faults),
     )
-    force = simulate_trial(muscle, given).force_n / trial.facts.f0_n
+    force = simulate_trial(muscle, given, substeps).force_n / trial.facts.f0_n
     recorded = recorded_force(trial.time_s, force, faults) + coloured_noise(random, force.size, noise_sd_f0)
     return replace(trial, force_time_s=trial.time_s, force_n=recorded * trial.facts.f0_n)

@@ -1,0 +1,49 @@
+"""Descents as work: plain data in, plain data out, so that they run anywhere and are kept in a journal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.noise import Scale, scale_of
+from xb_muscle_ros.fit.problem import Problem
+from xb_muscle_ros.fit.solve import Objective, Solution, descend
+from xb_muscle_ros.fit.training import Training
+from xb_muscle_ros.work import Options, run
+
+
+def start_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
+    """One descent; None where the model has no solution at its start, from where nothing tells which way to go."""
+    objective = Objective(Training(Problem.from_json(task["problem"])), Scale(*task["scale"]))
+    z = np.array(task["z"])
+    try:
+        objective.training.force(z)
+        objective.training.feature_distance(z)
+    except UserError:
+        return None
+    return solution_to_json(descend(objective, z))
+
+
+def polished(problem: Problem, best: Solution, options: Options) -> tuple[Solution, Scale]:
+    """The best point under the scale that the residuals turn out to have."""
+    training = Training(problem)
+    residual = training.force(best.z) - training.measured
+    scale = scale_of([residual[s] for s in training.slices()], best.z.size)
+    task = {"problem": problem.to_json(), "z": best.z.tolist(), "scale": list(scale)}
+    here = replace(options, label="polish", processes=0 if options.scheduler is None else None)
+    row = run(start_task, [task], here)[0]
+    return (best if row is None else solution_from_json(row)), scale
+
+
+def solution_to_json(s: Solution) -> dict[str, Any]:
+    """Plain data."""
+    return {**s._asdict(), "z": s.z.tolist()}
+
+
+def solution_from_json(row: Mapping[str, Any]) -> Solution:
+    """A solution from plain data."""
+    return Solution(**{**row, "z": np.array(row["z"])})

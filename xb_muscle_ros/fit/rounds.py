@@ -1,0 +1,127 @@
+"""To the best point by a detailed method, led by the Gaussian form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.correction import Correction
+from xb_muscle_ros.fit.descents import polished
+from xb_muscle_ros.fit.methods import Difference, corrected, difference, fast_form
+from xb_muscle_ros.fit.noise import Scale
+from xb_muscle_ros.fit.problem import Problem
+from xb_muscle_ros.fit.solve import Objective, Solution
+from xb_muscle_ros.fit.training import Training
+from xb_muscle_ros.work import Options
+
+Array = npt.NDArray[np.float64]
+
+# Rounds and halvings of one round's step at most.
+_ROUNDS, _HALVINGS = 8, 6
+# The correction holds where it meets the method itself to this, root mean square over the samples: a hundredth of the
+# noise of a good recording, and what steps of 1 ms on a grid err by.
+CLOSE_F0 = 1e-5
+# A gain in cost that is none: a hundredth of what one standard deviation of a coordinate is worth.
+_NO_GAIN = 0.005
+
+
+class Refined(NamedTuple):
+    """Where the rounds ended.
+
+    Attributes:
+        problem: by the Gaussian form, with its correction; that asked for where it needs none.
+        best: the best point.
+        scale: of the differences left there.
+        mismatch_f0: root-mean-square error of the corrected force at the best point against the method itself, F0.
+    """
+
+    problem: Problem
+    best: Solution
+    scale: Scale
+    mismatch_f0: float
+
+
+def refined(asked: Problem, best: Solution, options: Options) -> Refined:
+    """Go from the Gaussian form's best point to that of the problem's own method.
+
+    Each round corrects the Gaussian form at the point reached and descends anew. A step that makes the method's own
+    cost larger is halved.
+
+    Args:
+        asked: the problem, by any method.
+        best: best point by the Gaussian form, or one close to the best.
+        options: where the work is done.
+
+    Raises:
+        UserError: the method has no solution at the point.
+    """
+    if fast_form(asked) is asked:
+        return Refined(asked, *polished(asked, best, options), 0.0)
+    try:
+        here = difference(asked, best.z)
+    except UserError as error:
+        raise UserError(
+            f"method {asked.fibre.method} has no solution where the Gaussian form fits best: {error}; start from "
+            "another fibre file"
+        ) from error
+    mismatch = _root_mean_square(list(here.force.values()))
+    for _ in range(_ROUNDS):
+        problem = corrected(asked, best.z, here, replace(options, label="correction"))
+        found, scale = polished(problem, best, options)
+        here, best, moved = _stepped(asked, here, best, found, scale)
+        if not moved:
+            # The slopes of the correction are no use: the method errs by more than it should.
+            break
+        mismatch = _mismatch(problem, best.z, here)
+        if mismatch <= CLOSE_F0:
+            break
+    return Refined(problem, best, scale, mismatch)
+
+
+def _stepped(
+    asked: Problem, here: Difference, old: Solution, new: Solution, scale: Scale
+) -> tuple[Difference, Solution, bool]:
+    """A point on the way from old to new where the method's own cost is not larger, the new one first.
+
+    Returns:
+        difference there, the point with its cost by the method itself, and whether it is not the old one.
+    """
+    before = _exactly(asked, here, old, scale)
+    z = new.z
+    for _ in range(_HALVINGS):
+        try:
+            there = difference(asked, z)
+        except UserError:
+            pass
+        else:
+            after = _exactly(asked, there, new._replace(z=z), scale)
+            if after.cost <= before.cost + _NO_GAIN:
+                return there, after, True
+        z = 0.5 * (old.z + z)
+    return here, before, False
+
+
+def _exactly(asked: Problem, here: Difference, point: Solution, scale: Scale) -> Solution:
+    """A point with cost and RMSD by the method itself, from its difference there."""
+    none = {name: np.zeros((force.size, point.z.size)) for name, force in here.force.items()}
+    exact = Correction(point.z, here.force, none, here.features, np.zeros((here.features.size, point.z.size)))
+    training = Training(replace(fast_form(asked), correction=exact))
+    cost = float(0.5 * np.sum(Objective(training, scale).residuals(point.z) ** 2))
+    return point._replace(cost=cost, rmsd_f0=_root_mean_square([training.force(point.z) - training.measured]))
+
+
+def _mismatch(problem: Problem, z: Array, here: Difference) -> float:
+    """Root-mean-square difference between the correction of a problem at a point and the right one, F0."""
+    correction = problem.correction
+    if correction is None:
+        return 0.0
+    return _root_mean_square([force - correction.of_trial(name, z) for name, force in here.force.items()])
+
+
+def _root_mean_square(parts: list[Array]) -> float:
+    whole = np.concatenate([*parts, np.empty(0)])
+    return float(np.sqrt(np.mean(whole**2))) if whole.size else 0.0
