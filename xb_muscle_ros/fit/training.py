@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -77,18 +80,23 @@ class Training:
         Returns:
             shapes (samples, coordinates) and (features, coordinates).
         """
+        return self.slopes_by(z, range(z.size))
+
+    def slopes_by(self, z: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
+        """As `slopes`, by some of the coordinates, in the order of their indices as given."""
         true, force, distance = self.true_forces(z), self.force(z), self.feature_distance(z)
         upper = self.problem.bounds[1]
-        of_force, of_features = np.zeros((force.size, z.size)), np.zeros((distance.size, z.size))
-        for j, c in enumerate(self.problem.coordinates):
+        of_force, of_features = np.zeros((force.size, len(chosen))), np.zeros((distance.size, len(chosen)))
+        for place, j in enumerate(chosen):
+            c = self.problem.coordinates[j]
             step = step_of(c, _STEP)
             for signed in (-step, step) if z[j] + step > upper[j] else (step, -step):
                 moved = z.copy()
                 moved[j] += signed
                 try:
-                    of_force[:, j] = (self._stepped(moved, c, true, force) - force) / signed
+                    of_force[:, place] = (self._stepped(moved, c, true, force) - force) / signed
                     if c.group is None or c.name == "pca_shift":
-                        of_features[:, j] = (self.feature_distance(moved) - distance) / signed
+                        of_features[:, place] = (self.feature_distance(moved) - distance) / signed
                     break
                 except UserError:
                     continue
@@ -109,7 +117,10 @@ class Training:
 
 def step_of(c: Coordinate, step: float) -> float:
     """Step of a slope in a coordinate, from that of a parameter on a logarithmic scale."""
-    return step if c.group is None else step * FAULTS[c.name].sd / 0.05
+    if c.group is not None:
+        return step * FAULTS[c.name].sd / 0.05
+    # On a linear scale a unit may be anything; the prior says what counts as much.
+    return step if c.log or math.isinf(c.prior_sd) else step * max(1.0, c.prior_sd)
 
 
 def finite_start(training: Training) -> None:

@@ -1,0 +1,170 @@
+"""Which candidates are worth a fit: what each could take of the residual once everything fitted so far gives way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.diagnose.catalogue import Entry, applicable, is_swap
+from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
+from xb_muscle_ros.diagnose.refit import Fit
+from xb_muscle_ros.diagnose.study import SCALE, Explanation, Study, entry_starts
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.problem import Problem
+from xb_muscle_ros.fit.solve import Objective
+from xb_muscle_ros.fit.training import Training
+from xb_muscle_ros.measurement.faults import FAULTS
+
+Array = npt.NDArray[np.float64]
+
+# A mechanism's line is followed this far either way, in units of its start, where the fit begins.
+_LEAST_SHARE, _MOST_SHARE = 0.1, 8.0
+
+
+class Screened(NamedTuple):
+    """What one candidate promises.
+
+    Attributes:
+        name: of it.
+        gain: by how much the cost would fall along its line, everything else giving way, in the cost's unit; nan where
+            only a fit can tell.
+        signature_f0: what it adds to the forces that nothing fitted so far could, per unit, concatenated; shape
+            (samples,); empty for faults with several values and where only a fit can tell.
+        starts: values to start a fit from.
+    """
+
+    name: Name
+    gain: float
+    signature_f0: Array
+    starts: tuple[dict[str, float], ...]
+
+
+@dataclass(frozen=True)
+class Linear:
+    """A fit, taken as linear around its best point.
+
+    Attributes:
+        problem: with the best point as its start.
+        residual_f0: measured less predicted force of all training samples.
+        slopes: of the forces by the coordinates.
+        weights: of the samples.
+        inverse: of the curvature, priors included.
+    """
+
+    problem: Problem
+    residual_f0: Array
+    slopes: Array
+    weights: Array
+    inverse: Array
+
+    @staticmethod
+    def of(study: Study, fit: Fit) -> Linear:
+        """Around a fit's best point."""
+        problem = fit.problem(study)
+        objective = Objective(Training(problem), SCALE)
+        slopes, _ = objective.training.slopes(problem.start)
+        weights = objective.weights()
+        sds = np.array([c.prior_sd for c in problem.coordinates])
+        weighted = slopes * weights[:, None]
+        curvature = weighted.T @ weighted + np.diag(np.where(np.isfinite(sds), sds**-2.0, 0.0))
+        residual = objective.training.measured - objective.training.force(problem.start)
+        return Linear(problem, residual, slopes, weights, np.linalg.pinv(curvature, hermitian=True))
+
+    def left(self, columns: Array) -> Array:
+        """What no coordinate of the fit can do of some changes of force, shape (samples, n)."""
+        pulled = self.slopes.T @ (columns * self.weights[:, None] ** 2)
+        projected: Array = columns - self.slopes @ (self.inverse @ pulled)
+        return projected
+
+    def gain(self, columns: Array, prior_sd: Array) -> tuple[float, Array]:
+        """By how much the cost falls with further coordinates of these slopes and priors around 0, and their values."""
+        left = self.left(columns) * self.weights[:, None]
+        raw = columns * self.weights[:, None]
+        curvature = raw.T @ left + np.diag(prior_sd**-2.0)
+        pull = left.T @ (self.residual_f0 * self.weights)
+        values = np.linalg.solve(curvature, pull)
+        return 0.5 * float(pull @ values), values
+
+
+def screen(study: Study, fit: Fit, linear: Linear) -> list[Screened]:
+    """All candidates that a fit does not have yet, the most promising first; those that only a fit can tell lead."""
+    found = [*_faults(study, fit, linear), *_mechanisms(study, fit, linear)]
+    return sorted(found, key=lambda s: np.inf if np.isnan(s.gain) else s.gain, reverse=True)
+
+
+def _faults(study: Study, fit: Fit, linear: Linear) -> Iterator[Screened]:
+    for name in MEASUREMENT:
+        if name in fit.explanation.faults:
+            continue
+        problem = study.problem(fit.explanation.plus(name), fit.values)
+        own = [j for j, c in enumerate(problem.coordinates) if c.name == name.value]
+        training = Training(problem)
+        columns, _ = training.slopes_by(problem.start, own)
+        gain, values = linear.gain(columns, np.full(len(own), FAULTS[name.value].sd))
+        start = {problem.coordinates[j].label: float(v) for j, v in zip(own, values, strict=True)}
+        signature = linear.left(columns)[:, 0] if len(own) == 1 else np.empty(0)
+        yield Screened(name, gain, signature, ({**fit.values, **start},))
+
+
+def _mechanisms(study: Study, fit: Fit, linear: Linear) -> Iterator[Screened]:
+    training = Training(linear.problem)
+    force = training.force(linear.problem.start)
+    for entry in applicable(study.fibre.model):
+        if entry.name in fit.explanation.mechanisms or not _goes_with(study, fit.explanation, entry.name):
+            continue
+        starts = entry_starts(entry, study.fibre, fit.values)
+        if entry.effect is None:
+            yield Screened(entry.name, np.nan, np.empty(0), tuple(starts))
+            continue
+        yield _along_lines(study, fit, linear, entry, starts, force)
+
+
+def _goes_with(study: Study, explanation: Explanation, name: Name) -> bool:
+    try:
+        study.problem(explanation.plus(name), {})
+    except UserError:
+        return False
+    return True
+
+
+def _along_lines(
+    study: Study, fit: Fit, linear: Linear, entry: Entry, starts: list[dict[str, float]], force: Array
+) -> Screened:
+    """A mechanism at each of its starting values, followed along the line from its absence."""
+    assert entry.effect is not None
+    best = Screened(entry.name, 0.0, np.empty(0), (starts[0],))
+    explanation = fit.explanation.plus(entry.name)
+    for start in starts:
+        problem = study.problem(explanation, start)
+        try:
+            column = Training(problem).force(problem.start) - force
+        except UserError:
+            continue
+        effect = float(start[entry.effect])
+        gain, (share,) = linear.gain(column[:, None], np.array([entry.size / abs(effect)]))
+        lower = next(c.lower for c in problem.coordinates if c.name == entry.effect)
+        if share <= 0.0 and lower >= 0.0:
+            continue
+        if gain > best.gain:
+            share = float(np.sign(share) * np.clip(abs(share), _LEAST_SHARE, _MOST_SHARE))
+            begun = {**start, entry.effect: share * effect}
+            best = Screened(entry.name, gain, linear.left(column[:, None])[:, 0], (begun,))
+    return best
+
+
+def overlap(a: Array, b: Array, weights: Array) -> float:
+    """Cosine of two signatures, 0 where one is missing."""
+    if not a.size or not b.size:
+        return 0.0
+    x, y = a * weights, b * weights
+    norm = float(np.linalg.norm(x) * np.linalg.norm(y))
+    return float(x @ y) / norm if norm > 0.0 else 0.0
+
+
+def only_a_fit_can_tell(screened: Screened) -> bool:
+    """Whether a candidate cannot be judged along a line: its absence is another model."""
+    return is_swap(screened.name) and bool(np.isnan(screened.gain))

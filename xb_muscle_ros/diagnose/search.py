@@ -1,0 +1,214 @@
+"""The search: one explanation after another put beside the parameters, for as long as it explains more than noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.diagnose.closure import closure_error
+from xb_muscle_ros.diagnose.names import Name
+from xb_muscle_ros.diagnose.refit import Fit, fit_of, refit_task
+from xb_muscle_ros.diagnose.screen import Linear, Screened, screen
+from xb_muscle_ros.diagnose.study import Explanation, Study
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.work import Options, run
+
+# What a further parameter has to take off the cost to be worth it (half the logarithm of some hundred independent
+# samples), and what share of the cost a further explanation has to take off.
+PENALTY = 3.0
+_WORTH = 0.15
+# A candidate is fitted if the line promises this share of what the best one promises, and this much of the cost.
+_PROMISE, _LEAST_GAIN = 0.1, 6.0
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How hard to look.
+
+    Attributes:
+        steps: explanations put together at most.
+        candidates: fitted at each step.
+        most: points to try in a fit.
+        folds: into which trials are split for held-out scores.
+        rivals: of the answer whose held-out scores are computed.
+        draws: of the bootstrap.
+        closure: rounds of taking out the Gaussian form's own error.
+    """
+
+    steps: int = 3
+    candidates: int = 7
+    most: int = 20
+    folds: int = 7
+    rivals: int = 4
+    draws: int = 500
+    closure: int = 2
+
+
+QUICK = Effort(steps=2, candidates=5, most=12, folds=3, rivals=2, draws=200, closure=1)
+
+
+@dataclass
+class Search:
+    """What the search found.
+
+    Attributes:
+        study: with the closure's error of the base.
+        base: parameters alone.
+        final: the explanation that was arrived at.
+        fits: every explanation that was fitted, by label.
+        screened: candidates at the base, the most promising first.
+        linear: the base, taken as linear.
+    """
+
+    study: Study
+    base: Fit
+    final: Fit
+    screened: Sequence[Screened]
+    linear: Linear
+    fits: dict[str, Fit] = field(default_factory=dict)
+
+    def rivals(self, name: Name) -> list[Fit]:
+        """Fits with something else in the place of one name of the final explanation, the best first."""
+        rest = self.final.explanation.without(name)
+        found = [
+            fit
+            for fit in self.fits.values()
+            if len(fit.explanation.names) == len(rest.names) + 1
+            and set(rest.names) < set(fit.explanation.names)
+            and name not in fit.explanation.names
+        ]
+        return sorted(found, key=penalised)
+
+
+def penalised(fit: Fit) -> float:
+    """Cost with what its parameters cost; a fault with a value for each trial counts once, its prior does the rest."""
+    from xb_muscle_ros.diagnose.catalogue import CATALOGUE
+
+    parameters = sum(len(CATALOGUE[name].parameters) for name in fit.explanation.mechanisms)
+    return fit.cost + PENALTY * (parameters + len(fit.explanation.faults))
+
+
+class Searcher:
+    """Fits explanations of one study, each once."""
+
+    def __init__(self, study: Study, effort: Effort, options: Options) -> None:
+        self.study, self.effort, self.options = study, effort, options
+        self.fits: dict[str, Fit] = {}
+
+    def fitted(self, wanted: Sequence[tuple[Explanation, Sequence[dict[str, float]]]], label: str) -> list[Fit]:
+        """Fits of explanations, each from its starts; those without a solution are left out."""
+        plain = self.study.to_json()
+        fresh = [(e, starts) for e, starts in wanted if e.label not in self.fits]
+        tasks = [
+            {
+                "study": plain,
+                "names": [n.value for n in explanation.names],
+                "starts": [dict(s) for s in starts],
+                "held_out": [],
+                "most": self.effort.most,
+                "predict": False,
+            }
+            for explanation, starts in fresh
+        ]
+        for row in run(refit_task, tasks, replace(self.options, label=label)):
+            if row is not None:
+                fit = fit_of(row)
+                self.fits[fit.explanation.label] = fit
+        return [self.fits[e.label] for e, _ in wanted if e.label in self.fits]
+
+    def base(self) -> Fit:
+        """Parameters alone, with the closure's error of where they end taken out.
+
+        Raises:
+            UserError: the model has no solution at the fibre's own values.
+        """
+        starts: list[dict[str, float]] = [{}, *_spread(self.study)]
+        found = self.fitted([(Explanation(), starts)], "base")
+        if not found:
+            raise UserError(
+                f"fibre {self.study.fibre.name}, model {self.study.fibre.model}: no solution at the values of the fibre "
+                "file; start from another one"
+            )
+        for _ in range(self.effort.closure):
+            self.study = replace(self.study, closure_f0=closure_error(self.study, found[0]))
+            self.fits.clear()
+            found = self.fitted([(Explanation(), [dict(found[0].values)])], "closure") or found
+        return found[0]
+
+    def search(self, significant: Callable[[Study, Fit], bool]) -> Search:
+        """Search until what is left is not significant any more, or nothing more is worth it.
+
+        Args:
+            significant: whether more than noise is left of a fit.
+        """
+        base = final = self.base()
+        linear = Linear.of(self.study, base)
+        screened = screen(self.study, base, linear)
+        found = Search(self.study, base, final, screened, linear, self.fits)
+        candidates: Sequence[Screened] = screened
+        for step in range(self.effort.steps):
+            if not significant(self.study, final):
+                break
+            if step > 0:
+                candidates = screen(self.study, final, Linear.of(self.study, final))
+            better = self._step(final, candidates, step)
+            if better is None:
+                break
+            final = better
+        found.final = self._pruned(final)
+        return found
+
+    def _step(self, final: Fit, candidates: Sequence[Screened], step: int) -> Fit | None:
+        """The best fit with one more explanation, or None where none is worth it."""
+        chosen = _promising(candidates, final.cost, self.effort.candidates)
+        wanted = [(final.explanation.plus(s.name), s.starts) for s in chosen]
+        fits = self.fitted(wanted, f"step {step + 1}")
+        best = min(fits, key=penalised, default=None)
+        if best is None or penalised(final) - penalised(best) < max(2.0 * PENALTY, _WORTH * final.cost):
+            return None
+        return best
+
+    def _pruned(self, final: Fit) -> Fit:
+        """Without what later steps have made superfluous."""
+        names = final.explanation.names
+        if len(names) < 2:
+            return final
+        without = [(final.explanation.without(n), (dict(final.values),)) for n in names]
+        fits = self.fitted(without, "superfluous")
+        best = min(fits, key=penalised, default=final)
+        worth = max(2.0 * PENALTY, _WORTH * best.cost)
+        return self._pruned(best) if penalised(best) - penalised(final) < worth else final
+
+    def compete(self, found: Search) -> None:
+        """Fit what might stand in the place of each name of the final explanation, so that it has rivals."""
+        for name in found.final.explanation.names if len(found.final.explanation.names) > 1 else ():
+            rest = self.fits.get(found.final.explanation.without(name).label)
+            if rest is None:
+                continue
+            linear = Linear.of(self.study, rest)
+            chosen = _promising(screen(self.study, rest, linear), rest.cost, self.effort.rivals)
+            self.fitted([(rest.explanation.plus(s.name), s.starts) for s in chosen], "rivals")
+
+
+def _promising(candidates: Sequence[Screened], cost: float, most: int) -> list[Screened]:
+    """Candidates worth a fit: those that only a fit can tell, and the most promising of the others."""
+    blind = [s for s in candidates if np.isnan(s.gain)]
+    told = [s for s in candidates if not np.isnan(s.gain)]
+    best = max((s.gain for s in told), default=0.0)
+    return [*blind, *(s for s in told if s.gain >= max(_PROMISE * best, _LEAST_GAIN, 0.01 * cost))][: most + len(blind)]
+
+
+def _spread(study: Study) -> list[dict[str, float]]:
+    """Further points to start the base from: more and less cooperativity, faster and slower heads."""
+    values = study.fibre.values
+    found: list[dict[str, float]] = []
+    for factors in ({"koop": 3.0, "kon": 0.6}, {"koop": 0.4, "kon": 1.4}, {"f": 0.7, "k11": 0.5}):
+        start = {name: values[name] * factor for name, factor in factors.items() if values.get(name, 0.0) > 0.0}
+        if start and start not in found:
+            found.append(start)
+    return found
+
+
