@@ -179,5 +179,6 @@ def exceeding(time_s: Array, value_f0: Array, threshold_f0: float) -> tuple[floa
     width = max(value_f0.size // 8, 1)
     counts = np.convolve(np.ones(value_f0.size), np.ones(width), "same")
     smooth = np.abs(np.convolve(value_f0, np.ones(width), "same") / counts)
-    where = np.flatnonzero(smooth >= min(threshold_f0, 0.5 * float(smooth.max())))
+    largest = float(smooth.max())
+    where = np.flatnonzero(smooth >= (threshold_f0 if largest > threshold_f0 else 0.5 * largest))
     return float(time_s[where[0]]), float(time_s[where[-1]])

@@ -93,13 +93,15 @@ class TrialNoise:
         """At lags 0 to `lags` - 1 samples, shape (lags,), F0²."""
         return extended(self.sd_f0**2 * self.colour, lags)
 
-    def draw(self, n: int, draws: int, random: np.random.Generator, uncertain: bool) -> Array:
-        """Noise of n samples, shape (n, draws); see `NoiseModel.draw`."""
+    def draw(self, n: int, picked: npt.NDArray[np.intp] | None, draws: int, random: np.random.Generator) -> Array:
+        """Noise of n samples, shape (n, draws), each of the member picked and of a size drawn; None: the likeliest."""
         out = np.empty((draws, n))
-        shares = np.array_split(np.arange(draws), len(self.members) if uncertain else 1)
-        for member, share in zip(self.members, shares, strict=False):
+        which = np.zeros(draws, dtype=np.intp) if picked is None else picked % len(self.members)
+        for k in np.unique(which):
+            share = np.flatnonzero(which == k)
+            member = self.members[k]
             fresh = np.full(share.size, member.fresh_f0)
-            if uncertain:
+            if picked is not None:
                 fresh = fresh * np.sqrt(self.freedom / np.maximum(random.chisquare(self.freedom, share.size), 1e-12))
             white = fresh[:, None] * random.standard_normal((share.size, n + _BURN_IN))
             # Along the last axis, where samples lie side by side: three times as fast.
@@ -137,7 +139,9 @@ class NoiseModel:
         Returns:
             Shape (sum of samples, draws), F0, trials one below the other.
         """
-        drawn = [noise.draw(n, draws, random, uncertain) for noise, n in zip(self.trials, samples, strict=True)]
+        # The same member for all trials: see `noise_model`.
+        picked = random.integers(_MEMBERS, size=draws) if uncertain else None
+        drawn = [noise.draw(n, picked, draws, random) for noise, n in zip(self.trials, samples, strict=True)]
         return np.concatenate([np.empty((0, draws)), *drawn])
 
 
