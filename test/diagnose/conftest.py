@@ -1,7 +1,8 @@
-"""Made studies: trials of a stretch-shortening-stretch protocol with coloured noise, and slopes that a fit might have."""
+"""Made studies: stretch-shortening-stretch trials with coloured noise, and slopes that a fit might have."""
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -73,7 +74,7 @@ def make_study(pcas: tuple[float, ...], shared: int, seed: int, recovery_s: floa
         rough = random.normal(size=sum(sizes) + 90)
         slopes[:, j] = 0.1 * np.convolve(rough, kernel / np.sqrt(np.sum(kernel**2)), "valid")
     edges = np.cumsum([0, *sizes])
-    for i, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+    for i, (a, b) in enumerate(itertools.pairwise(edges)):
         slopes[a:b, shared + i] = 1.0
     prior = np.array([1.0] * shared + [1.0 / 0.005**2] * len(sizes))
     return Study(tuple(residuals), LinearFit(slopes, np.full(sum(sizes), 1.0 / (0.001 * np.sqrt(40.0))), prior))

@@ -78,7 +78,9 @@ def check(residuals: Sequence[Residual]) -> None:
             raise UserError(f"trial {r.trial} is there {names.count(r.trial)} times; give each trial once")
         if not n or any(a.shape != (n,) for a in (r.value_f0, r.length_l0, r.calcium_um)):
             sizes = ", ".join(str(a.size) for a in (r.time_s, r.value_f0, r.length_l0, r.calcium_um))
-            raise UserError(f"trial {r.trial}: {sizes} samples of time, residual, length and calcium; needed is one each")
+            raise UserError(
+                f"trial {r.trial}: {sizes} samples of time, residual, length and calcium; needed is one each"
+            )
         if not np.all(np.isfinite(r.value_f0)):
             raise UserError(f"trial {r.trial}: the residual is not finite; leave the trial out")
         if np.any(np.diff(r.time_s) <= 0.0):
@@ -96,7 +98,9 @@ def cut(residuals: Sequence[Residual]) -> tuple[Cell, ...]:
     first = 0
     for r in residuals:
         for name, begin, end in _parts(r):
-            cells.append(Cell(r.trial, name, float(r.time_s[begin]), float(r.time_s[end - 1]), first + begin, first + end))
+            cells.append(
+                Cell(r.trial, name, float(r.time_s[begin]), float(r.time_s[end - 1]), first + begin, first + end)
+            )
         first += r.time_s.size
     return tuple(cells)
 

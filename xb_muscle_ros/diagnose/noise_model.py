@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize
 from scipy.signal import lfilter
+from scipy.special import ndtri
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.noise import extended
@@ -37,10 +38,13 @@ _OTHERS = 100
 _LEAST_SD_F0 = 1e-5
 # Sampling steps within this factor of each other have noise of one colour.
 _SAME_STEP = 1.2
-# Partial correlations as inverse hyperbolic tangents: how far they go (0.995), and a prior that only tames them.
-_REACH, _PRIOR_SD = 3.0, 2.0
-# Models of the noise from which draws come, and samples until drawn noise forgets how it began.
-_MEMBERS, _BURN_IN = 24, 400
+# Partial correlations as inverse hyperbolic tangents: how far they go (0.995), and what to expect of force recordings
+# (rat soleus fibre 18Dec2017a has lag-1 correlations of 0.91 to 0.98, and hum). White noise overrules it in 50 samples.
+_REACH, _PRIOR_SD = 3.0, 0.7
+_PRIOR_MEAN = np.array([1.8] + [0.0] * (_ORDER - 1))
+# Models of the noise from which draws come, of how many that were tried, and how much wider than a normal posterior
+# these were; samples until drawn noise forgets how it began.
+_MEMBERS, _TRIED, _WIDER, _BURN_IN = 24, 480, 1.5, 400
 # SD of log-SD of trials without a window around those with one, where a single one has one.
 _SPREAD = 0.7
 
@@ -80,13 +84,15 @@ class TrialNoise:
         sd_f0: standard deviation, F0.
         colour: correlation at lags 0, 1, ... samples, shape (order + 1,).
         freedom: degrees of freedom with which the size is known, given the colour.
-        members: models to draw from, as probable as each other; the most probable one first.
+        likeliest: the model of this size and colour.
+        members: models to draw from, as probable as each other, from little noise to much.
     """
 
     trial: str
     sd_f0: float
     colour: Array
     freedom: float
+    likeliest: Member
     members: tuple[Member, ...]
 
     def autocovariance(self, lags: int) -> Array:
@@ -96,10 +102,10 @@ class TrialNoise:
     def draw(self, n: int, picked: npt.NDArray[np.intp] | None, draws: int, random: np.random.Generator) -> Array:
         """Noise of n samples, shape (n, draws), each of the member picked and of a size drawn; None: the likeliest."""
         out = np.empty((draws, n))
-        which = np.zeros(draws, dtype=np.intp) if picked is None else picked % len(self.members)
+        which = np.full(draws, -1) if picked is None else picked % len(self.members)
         for k in np.unique(which):
             share = np.flatnonzero(which == k)
-            member = self.members[k]
+            member = self.likeliest if picked is None else self.members[k]
             fresh = np.full(share.size, member.fresh_f0)
             if picked is not None:
                 fresh = fresh * np.sqrt(self.freedom / np.maximum(random.chisquare(self.freedom, share.size), 1e-12))
@@ -139,7 +145,7 @@ class NoiseModel:
         Returns:
             Shape (sum of samples, draws), F0, trials one below the other.
         """
-        # The same member for all trials: see `noise_model`.
+        # The same place in the order for all trials: what is wrong with the colour of one is wrong with the others'.
         picked = random.integers(_MEMBERS, size=draws) if uncertain else None
         drawn = [noise.draw(n, picked, draws, random) for noise, n in zip(self.trials, samples, strict=True)]
         return np.concatenate([np.empty((0, draws)), *drawn])
@@ -180,14 +186,9 @@ def noise_model(windows: Sequence[Window]) -> NoiseModel:
             f"no trial holds still for {_LEAST} samples of force (the longest isometric window has {longest}), so that "
             "its noise is unknown; give at least one trial with an isometric phase"
         )
-    # The same for all trials: what is wrong with the colour of one is wrong with that of the others.
-    normal = np.random.default_rng(0).standard_normal((_MEMBERS, _ORDER))
-    normal[0] = 0.0
     sounding = [p for p in parts.values() if not p.silent]
-    begin = np.zeros(_ORDER)
-    begin[0] = 1.0
-    start = _most_probable(sounding, [1.0] * len(sounding), begin) if len(sounding) > 1 else begin
-    found = {name: _estimated(name, parts, start, normal) for name in parts}
+    start = _most_probable(sounding, [1.0] * len(sounding), _PRIOR_MEAN) if len(sounding) > 1 else _PRIOR_MEAN
+    found = {name: _estimated(name, parts, start) for name in parts}
     return NoiseModel(tuple(found.get(w.trial) or _without_window(w, parts, list(found.values())) for w in windows))
 
 
@@ -200,118 +201,154 @@ class _Part:
         at = np.linspace(-1.0, 1.0, n)
         drift, _ = np.linalg.qr(np.vander(at, 3 if n >= _CURVED else 2))
         left = window.force_f0 - drift @ (drift.T @ window.force_f0)
-        # Force first, then the drift: all are whitened together.
-        columns = np.column_stack([left, drift]).T
+        self.silent = float(np.sqrt(np.mean(left**2))) < _LEAST_SD_F0
+        self.freedom = float(n - drift.shape[1])
+        # Force first, then three columns of drift, the last of them perhaps empty: all are whitened together.
+        columns = np.zeros((4, n))
+        columns[0], columns[1 : 1 + drift.shape[1]] = left, drift.T
+        self.empty = np.diag([0.0, 0.0, 3.0 - drift.shape[1]])
         self.begin = columns[:, :_ORDER]
         # Products of all columns at all lags: what is new in the samples is a sum over them, however long the window.
         lagged = np.stack([columns[:, _ORDER - k : n - k] for k in range(_ORDER + 1)])
-        self.products = np.einsum("ict,jdt->cdij", lagged, lagged, optimize=True)
-        self.silent = float(np.sqrt(np.mean(left**2))) < _LEAST_SD_F0
-        self.freedom = float(n - drift.shape[1])
-
-    def squares(self, filters: Sequence[Array], sizes: Array) -> tuple[float, float]:
-        """Sum of squares of what is new in the samples, drift taken out, F0², and the log-determinants.
-
-        Args:
-            filters: weights of the autoregressions of order 0, 1, ...
-            sizes: variance of what is new under each, in units of the last one's, same length.
-        """
-        last = np.concatenate([[1.0], -filters[-1]])
-        begin = np.column_stack(
-            [
-                (self.begin[:, k] - self.begin[:, :k][:, ::-1] @ filters[k]) / math.sqrt(sizes[k])
-                for k in range(_ORDER)
-            ]
-        )
-        gram = self.products @ last @ last + begin @ begin.T
-        drift, across = gram[1:, 1:], gram[1:, 0]
-        drift = drift + 1e-12 * np.trace(drift) * np.eye(drift.shape[0])
-        left = float(gram[0, 0] - across @ np.linalg.solve(drift, across))
-        return max(left, 1e-300), float(np.sum(np.log(sizes[:_ORDER])) + np.linalg.slogdet(drift)[1])
+        self.products = np.einsum("ict,jdt->ijcd", lagged, lagged, optimize=True).reshape((_ORDER + 1) ** 2, 4, 4)
 
 
-def _filters(z: Array) -> tuple[list[Array], Array]:
-    """Autoregressions of order 0, 1, ... of partial correlations tanh(z), and the variance of what is new in each.
+class _Regressions(NamedTuple):
+    """Autoregressions of order 0, 1, ... of partial correlations, shape (many, ...).
 
-    The recursion of Levinson and Durbin; variances in units of the last one's.
+    Attributes:
+        filters: row k has what is new in sample k, given those before it, shape (many, order + 1, order + 1); the last
+            row holds for all later samples.
+        sizes: variance of what is new, in units of the last, shape (many, order + 1).
     """
-    filters, sizes = [np.empty(0)], [1.0]
-    for partial in np.tanh(z):
-        last = filters[-1]
-        filters.append(np.append(last - partial * last[::-1], partial))
-        sizes.append(sizes[-1] * (1.0 - partial**2))
-    return filters, np.array(sizes) / sizes[-1]
+
+    filters: Array
+    sizes: Array
 
 
-def _estimated(name: str, parts: dict[str, _Part], start: Array, normal: Array) -> TrialNoise:
+def _regressions(z: Array) -> _Regressions:
+    """Of partial correlations tanh(z), shape (many, order), by the recursion of Levinson and Durbin."""
+    partial = np.tanh(z)
+    filters = np.zeros((z.shape[0], _ORDER + 1, _ORDER + 1))
+    filters[:, 0, 0] = 1.0
+    for k in range(1, _ORDER + 1):
+        last, tanh = filters[:, k - 1, :k], partial[:, k - 1, None]
+        filters[:, k, 1 : k + 1] = last
+        filters[:, k, :k] -= tanh * last[:, ::-1]
+    left = np.cumprod(1.0 - partial**2, axis=1)
+    sizes = np.concatenate([np.ones((z.shape[0], 1)), left], axis=1)
+    return _Regressions(filters, sizes / sizes[:, -1:])
+
+
+def _squares(parts: Sequence[_Part], of: _Regressions) -> tuple[Array, Array]:
+    """Squares of what is new in the samples, drift taken out, F0², and log-determinants, shape (many, parts)."""
+    last = of.filters[:, -1, ::-1]
+    pairs = (last[:, :, None] * last[:, None, :]).reshape(last.shape[0], -1)
+    products = np.stack([p.products.reshape(-1, 16) for p in parts])
+    gram = np.swapaxes(pairs @ products, 0, 1).reshape(-1, len(parts), 4, 4)
+    rows = of.filters[:, :_ORDER, :_ORDER] / np.sqrt(of.sizes[:, :_ORDER, None])
+    begin = np.stack([p.begin for p in parts]) @ np.swapaxes(rows, -1, -2)[:, None]
+    gram = gram + begin @ np.swapaxes(begin, -1, -2)
+    drift, across = gram[..., 1:, 1:], gram[..., 1:, :1]
+    trace = np.trace(drift, axis1=-1, axis2=-2)[..., None, None]
+    drift = drift + 1e-12 * trace * np.eye(3) + np.stack([p.empty for p in parts])
+    left = gram[..., 0, 0] - np.sum(across * np.linalg.solve(drift, across), axis=(-1, -2))
+    log = np.sum(np.log(of.sizes), axis=1)[:, None] + np.linalg.slogdet(drift)[1]
+    return np.maximum(left, 1e-300), log
+
+
+def _estimated(name: str, parts: dict[str, _Part], start: Array) -> TrialNoise:
     """Noise of a trial with a window, sought from the start for its partial correlations."""
     part = parts[name]
     if part.silent:
         still = Member(np.empty(0), _LEAST_SD_F0)
-        return TrialNoise(name, _LEAST_SD_F0, np.ones(1), part.freedom, (still,))
+        return TrialNoise(name, _LEAST_SD_F0, np.array([1.0, 0.0]), part.freedom, still, (still,))
     others = [p for p in parts.values() if p is not part and not p.silent and _alike(p.step_s, part.step_s)]
     share = min(1.0, _OTHERS / max(sum(p.freedom for p in others), 1.0))
     counted, shares = [part, *others], [1.0, *(share for _ in others)]
     z = _most_probable(counted, shares, start)
-    spread = _spread(counted, shares, z)
-    members = []
-    for step in normal:
-        filters, sizes = _filters(np.clip(z + spread @ step, -_REACH, _REACH))
-        left, _ = part.squares(filters, sizes)
-        members.append(Member(filters[-1], math.sqrt(left / part.freedom)))
-    filters, sizes = _filters(z)
-    sd = max(members[0].fresh_f0 * math.sqrt(float(sizes[0])), _LEAST_SD_F0)
-    return TrialNoise(name, sd, _correlation(filters), part.freedom, tuple(members))
+    found = _regressions(z[None])
+    likeliest = _members(part, found)[0]
+    sd = max(likeliest.fresh_f0 * math.sqrt(float(found.sizes[0, 0])), _LEAST_SD_F0)
+    members = _members(part, _regressions(_possible(counted, shares, z)))
+    return TrialNoise(name, sd, _correlation(found.filters[0]), part.freedom, likeliest, members)
 
 
-def _cost(parts: Sequence[_Part], shares: Sequence[float], z: Array) -> float:
+def _members(part: _Part, of: _Regressions) -> tuple[Member, ...]:
+    fresh = np.sqrt(_squares([part], of)[0][:, 0] / part.freedom)
+    return tuple(Member(-row[-1, -2::-1], float(sd)) for row, sd in zip(of.filters, fresh, strict=True))
+
+
+def _possible(parts: Sequence[_Part], shares: Sequence[float], z: Array) -> Array:
+    """Partial correlations that windows leave possible, from little noise to much, shape (members, order).
+
+    Drawn around the most probable and resampled, because persistent noise stays possible for longer than a normal
+    distribution would have it.
+    """
+    normal = _WIDER * np.random.default_rng(0).standard_normal((_TRIED, _ORDER))
+    tried = z + normal @ _spread(parts, shares, z).T
+    log = -_costs(parts, shares, np.clip(tried, -_REACH, _REACH)) + 0.5 * np.sum(normal**2, axis=1) / _WIDER**2
+    weights = np.where(np.all(np.abs(tried) <= _REACH, axis=1), np.exp(log - log.max()), 0.0)
+    found = _regressions(np.clip(tried, -_REACH, _REACH))
+    # Sorted before drawing at even steps, so that all of the distribution is met.
+    order = np.argsort(_squares(parts[:1], found)[0][:, 0] * found.sizes[:, 0])
+    steps = (np.arange(_MEMBERS) + 0.5) / _MEMBERS
+    total = np.cumsum(weights[order]) / max(float(weights.sum()), 1e-300)
+    picked = order[np.minimum(np.searchsorted(total, steps), _TRIED - 1)]
+    possible: Array = tried[picked]
+    return possible
+
+
+def _costs(parts: Sequence[_Part], shares: Sequence[float], z: Array) -> Array:
     """Minus the logarithm of the restricted likelihood of windows, each with its own size of noise, and of the prior.
 
     Args:
         parts: windows.
         shares: what each one's likelihood counts.
-        z: partial correlations, inverse hyperbolic tangents.
+        z: partial correlations, inverse hyperbolic tangents, shape (many, order).
+
+    Returns:
+        Shape (many,).
     """
-    filters, sizes = _filters(z)
-    total = 0.5 * float(z @ z) / _PRIOR_SD**2
-    for part, share in zip(parts, shares, strict=True):
-        left, log_determinant = part.squares(filters, sizes)
-        total += share * 0.5 * (part.freedom * math.log(left) + log_determinant)
-    return total
+    left, log_determinants = _squares(parts, _regressions(z))
+    of_parts = 0.5 * (np.array([p.freedom for p in parts]) * np.log(left) + log_determinants)
+    costs: Array = of_parts @ np.array(shares) + 0.5 * np.sum((z - _PRIOR_MEAN) ** 2, axis=1) / _PRIOR_SD**2
+    return costs
 
 
 def _most_probable(parts: Sequence[_Part], shares: Sequence[float], start: Array) -> Array:
     """Partial correlations (inverse hyperbolic tangents) at which `_cost` is least, shape (order,)."""
+    step = 1e-5
+    around = step * np.concatenate([np.zeros((1, _ORDER)), np.eye(_ORDER), -np.eye(_ORDER)])
+
+    def with_slopes(z: Array) -> tuple[float, Array]:
+        costs = _costs(parts, shares, z + around)
+        return float(costs[0]), (costs[1 : _ORDER + 1] - costs[_ORDER + 1 :]) / (2.0 * step)
+
     bounds = [(-_REACH, _REACH)] * _ORDER
-    found = minimize(
-        lambda z: _cost(parts, shares, z), start, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-7}
-    )
+    found = minimize(with_slopes, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-8})
     return np.asarray(found.x)
 
 
 def _spread(parts: Sequence[_Part], shares: Sequence[float], z: Array) -> Array:
     """A root of the covariance of partial correlations around the most probable, shape (order, order)."""
-    step = 0.05
-    moves = step * np.eye(_ORDER)
-    curvature = np.zeros((_ORDER, _ORDER))
-    for i in range(_ORDER):
-        for j in range(i + 1):
-            corners = [_cost(parts, shares, z + a * moves[i] + b * moves[j]) * a * b for a in (1, -1) for b in (1, -1)]
-            curvature[i, j] = curvature[j, i] = sum(corners) / (4.0 * step**2)
-    values, vectors = np.linalg.eigh(curvature)
+    moves = 0.05 * np.eye(_ORDER)
+    corners = np.array(
+        [[[(a * x + b * y) for a in (1, -1) for b in (1, -1)] for x in moves] for y in moves], dtype=np.float64
+    )
+    costs = _costs(parts, shares, z + corners.reshape(-1, _ORDER)).reshape(_ORDER, _ORDER, 4)
+    curvature = costs @ np.array([1.0, -1.0, -1.0, 1.0]) / (4.0 * 0.05**2)
+    values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
     root: Array = vectors / np.sqrt(np.maximum(values, 1.0 / _PRIOR_SD**2))
     return root
 
 
-def _correlation(filters: Sequence[Array]) -> Array:
-    """Correlation at lags 0 to the order, from autoregressions of order 0, 1, ..."""
+def _correlation(filters: Array) -> Array:
+    """Correlation at lags 0 to the order, from the rows of `_Regressions`."""
     found = [1.0]
-    for k in range(1, len(filters)):
-        # The last weight of order k is what lag k has beyond what order k - 1 predicts of it.
-        before = np.array(found)
-        new = 1.0 - float(filters[k - 1] @ before[1:]) if k > 1 else 1.0
-        expected = float(filters[k - 1] @ before[1:][::-1]) if k > 1 else 0.0
-        found.append(expected + float(filters[k][-1]) * new)
+    for k in range(1, _ORDER + 1):
+        # What is new in sample k has nothing to do with sample 0 (Yule and Walker).
+        found.append(-float(filters[k, :k] @ found))
     return np.array(found)
 
 
@@ -322,11 +359,19 @@ def _without_window(window: Window, parts: dict[str, _Part], known: Sequence[Tri
     alike = [noise for noise in known if _alike(parts[noise.trial].step_s, window.step_s)] or list(known)
     like = min(alike, key=lambda noise: abs(math.log(noise.sd_f0) - mean))
     factor = math.exp(mean) / like.sd_f0
-    sizes = np.exp(spread * np.random.default_rng(1).standard_normal(_MEMBERS)) * factor
-    sizes[0] = factor
-    members = [like.members[k % len(like.members)] for k in range(_MEMBERS)]
-    scaled = tuple(m._replace(fresh_f0=m.fresh_f0 * float(size)) for m, size in zip(members, sizes, strict=True))
-    return TrialNoise(window.trial, math.exp(mean), like.colour, like.freedom, scaled)
+    sizes = factor * np.exp(spread * ndtri((np.arange(_MEMBERS) + 0.5) / _MEMBERS))
+    return TrialNoise(
+        trial=window.trial,
+        sd_f0=math.exp(mean),
+        colour=like.colour,
+        freedom=like.freedom,
+        likeliest=_times(like.likeliest, factor),
+        members=tuple(_times(like.members[k % len(like.members)], float(sizes[k])) for k in range(_MEMBERS)),
+    )
+
+
+def _times(member: Member, factor: float) -> Member:
+    return member._replace(fresh_f0=member.fresh_f0 * factor)
 
 
 def _alike(step_s: float, other_s: float) -> bool:
