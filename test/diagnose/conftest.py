@@ -1,0 +1,86 @@
+"""Made studies: stretch-shortening-stretch trials with coloured noise, and slopes that a fit might have."""
+
+from __future__ import annotations
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from xb_muscle_ros.diagnose.cells import Residual
+from xb_muscle_ros.diagnose.linear_fit import LinearFit
+from xb_muscle_ros.diagnose.noise_model import Window
+from xb_muscle_ros.replay.made import coloured_noise
+from xb_muscle_ros.trials.protocol import StretchShortenStretch
+
+Array = npt.NDArray[np.float64]
+PCAS = (4.5, 5.8, 6.1, 6.3, 6.6)
+
+
+class Study(NamedTuple):
+    """Trials without a residual, and a fit of them."""
+
+    residuals: tuple[Residual, ...]
+    fit: LinearFit
+
+    @property
+    def sizes(self) -> list[int]:
+        return [r.time_s.size for r in self.residuals]
+
+    def split(self, values: Array) -> list[Array]:
+        """Values of all samples by trial."""
+        return np.split(values, np.cumsum(self.sizes)[:-1])
+
+    def noise(self, random: np.random.Generator, memory: float = 0.95) -> Array:
+        """Noise of all samples, 0.03 to 0.14 % F0."""
+        sds = np.geomspace(3e-4, 1.4e-3, len(self.sizes))[::-1]
+        parts = [coloured_noise(random, n, sd, memory) for n, sd in zip(self.sizes, sds, strict=True)]
+        return np.concatenate(parts)
+
+    def windows(self, noise: Array) -> list[Window]:
+        """Isometric windows: noise, a level and a drift."""
+        found = []
+        for r, value in zip(self.residuals, self.split(noise), strict=True):
+            inside = r.time_s < 0.085
+            found.append(Window(r.trial, 1e-3, 0.6 + 0.02 * r.time_s[inside] + value[inside]))
+        return found
+
+    def after(self, change: Array) -> tuple[Residual, ...]:
+        """Residuals that the fit leaves of a change of the data."""
+        left = self.split(self.fit.left(change[:, None])[:, 0])
+        return tuple(r._replace(value_f0=value) for r, value in zip(self.residuals, left, strict=True))
+
+
+def make_study(pcas: tuple[float, ...], shared: int, seed: int, recovery_s: float = 0.1) -> Study:
+    """Trials, and slopes of some shared smooth coordinates and of an offset for each trial."""
+    random = np.random.default_rng(seed)
+    residuals = []
+    for pca in pcas:
+        protocol = StretchShortenStretch(0.0383, recovery_s, lead_s=0.1)
+        trial = protocol.trial("made", pca)
+        n = trial.time_s.size
+        calcium = np.full(n, float(trial.calcium_um[0]))
+        facts = trial.facts
+        residuals.append(
+            Residual(f"pca{pca:g}", pca, trial.time_s, np.zeros(n), facts.phases, trial.length_change_l0, calcium)
+        )
+    sizes = [r.time_s.size for r in residuals]
+    slopes = np.zeros((sum(sizes), shared + len(sizes)))
+    # Smooth over 30 ms, of the size that forces change by when a parameter does by a factor of e.
+    kernel = np.exp(-0.5 * np.linspace(-3, 3, 91) ** 2)
+    for j in range(shared):
+        rough = random.normal(size=sum(sizes) + 90)
+        slopes[:, j] = 0.1 * np.convolve(rough, kernel / np.sqrt(np.sum(kernel**2)), "valid")
+    edges = np.cumsum([0, *sizes])
+    for i, (a, b) in enumerate(itertools.pairwise(edges)):
+        slopes[a:b, shared + i] = 1.0
+    prior = np.array([1.0] * shared + [1.0 / 0.005**2] * len(sizes))
+    return Study(tuple(residuals), LinearFit(slopes, np.full(sum(sizes), 1.0 / (0.001 * np.sqrt(40.0))), prior))
+
+
+@pytest.fixture(scope="session")
+def study() -> Study:
+    """Five trials and eight shared coordinates."""
+    return make_study(PCAS, 8, 0)

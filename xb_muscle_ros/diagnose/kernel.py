@@ -1,0 +1,203 @@
+"""The law of a residual: how it remembers length changes and what it grows with, even where no mechanism fits.
+
+Memories of velocity, x' = v - x/τ, are what viscoelastic, cross-bridge and calcium-dependent elements have in common
+to first order; a drag is a short one, a spring a long one. What the fit's coordinates could have taken is taken out of
+each memory before it is compared with the residual, so that only what was left can speak.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import nnls
+
+from xb_muscle_ros.diagnose.cells import Residual, check
+from xb_muscle_ros.diagnose.linear_fit import LinearFit
+from xb_muscle_ros.errors import UserError
+
+Array = npt.NDArray[np.float64]
+
+TAU_S = np.geomspace(0.002, 5.0, 18)
+CONSTANT = "constant"
+# Ridge on the weights against that of data: keeps memories that the fit nearly took out from growing without bound.
+_RIDGE = 1e-4
+# Time constants within this factor of the largest one's are one law.
+_NEAR = 4.0
+_LEAST_F0 = 1e-9
+
+
+class Law(NamedTuple):
+    """What the residual follows.
+
+    Attributes:
+        tau_s: time constants that were offered, shape (n,), s.
+        weight_f0: root-mean-square force of each memory in the recordings before any refit, shape (n,), F0, with the
+            sign of the law.
+        gain_f0_per_l0: of each memory, shape (n,): force per unit of the memory where what it scales with is 1.
+        time_constant_s: the dominant one.
+        scales_with: ``constant`` or a name among the scalings.
+        sign: 1: measured force lacks in the model with the sign of velocity; -1: against it.
+        explained: share of the residual's mean square that the law tells of trials left out (of one trial: of itself).
+        others: the same share for what else it could scale with, by name.
+    """
+
+    tau_s: Array
+    weight_f0: Array
+    gain_f0_per_l0: Array
+    time_constant_s: float
+    scales_with: str
+    sign: int
+    explained: float
+    others: Mapping[str, float]
+
+    @property
+    def stiffness_f0_per_l0(self) -> float:
+        """Of all memories together: force per length of a sudden change."""
+        return float(np.sum(self.gain_f0_per_l0))
+
+    @property
+    def viscosity_f0_s_per_l0(self) -> float:
+        """Of all memories together: force per velocity of a change that goes on for longer than they last."""
+        return float(self.gain_f0_per_l0 @ self.tau_s)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; `gain` is the stiffness."""
+        return {
+            "time_constant_s": self.time_constant_s,
+            "scales_with": self.scales_with,
+            "gain": self.stiffness_f0_per_l0,
+            "explained": self.explained,
+            "tau_s": self.tau_s.tolist(),
+            "weight_f0": self.weight_f0.tolist(),
+        }
+
+
+def memories(time_s: Array, length_l0: Array, tau_s: Array) -> Array:
+    """x' = v - x/τ from rest at the first sample, exact for length that is straight between samples.
+
+    Args:
+        time_s, length_l0: shape (n,), s and L0.
+        tau_s: shape (k,), s.
+
+    Returns:
+        Shape (n, k), L0.
+    """
+    return driven(time_s, np.diff(length_l0), tau_s)
+
+
+def driven(time_s: Array, change: Array, tau_s: Array) -> Array:
+    """Memories as of `memories`, driven by the length changes from sample to sample, shape (n - 1,), L0."""
+    out = np.zeros((time_s.size, tau_s.size))
+    dt = np.diff(time_s)[:, None]
+    kept = np.exp(-dt / tau_s)
+    given = change[:, None] / dt * tau_s * -np.expm1(-dt / tau_s)
+    for k in range(change.size):
+        out[k + 1] = kept[k] * out[k] + given[k]
+    return out
+
+
+def law(
+    residuals: Sequence[Residual],
+    fit: LinearFit,
+    scalings: Mapping[str, Sequence[Array]],
+    tau_s: Array = TAU_S,
+) -> Law | None:
+    """The law of what a fit left; None where no memory tells anything of a trial left out.
+
+    Non-negative least squares over all time constants at once, with either sign, for each thing that the law may
+    scale with; the best in cross-validation over trials counts.
+
+    Args:
+        residuals: of all trials, after the fit.
+        fit: its normal equations, samples in the order of the residuals.
+        scalings: by name, for each trial: activation, calcium (0 to 1, saturating), force ... at the residual's times.
+        tau_s: time constants to offer, s.
+
+    Raises:
+        UserError: residuals, samples or scalings that do not belong together.
+    """
+    known = scales(residuals, fit, scalings)
+    target = np.concatenate([r.value_f0 for r in residuals])
+    edges = np.cumsum([0, *(r.time_s.size for r in residuals)])
+    if float(np.sqrt(np.mean(target**2))) < _LEAST_F0:
+        return None
+    plain = np.concatenate([memories(r.time_s, r.length_l0, tau_s) for r in residuals])
+    best: tuple[float, str, int, Array, Array] | None = None
+    shares: dict[str, float] = {}
+    for name, scale in known.items():
+        columns = plain * scale[:, None]
+        sizes = np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300)
+        products = _Products(fit.left(columns / sizes), target, edges)
+        for sign in (1, -1):
+            share = products.explained(sign)
+            shares[name] = max(share, shares.get(name, -math.inf))
+            if best is None or share > best[0]:
+                best = (share, name, sign, products.weights(sign, None), sizes)
+    if best is None or best[0] <= 0.0 or not np.any(best[3] > 0.0):
+        return None
+    share, name, sign, weights, sizes = best
+    top = float(tau_s[int(np.argmax(weights))])
+    near = np.abs(np.log(tau_s / top)) <= math.log(_NEAR)
+    return Law(
+        tau_s=tau_s,
+        weight_f0=sign * weights,
+        gain_f0_per_l0=sign * weights / sizes,
+        time_constant_s=float(np.exp(np.average(np.log(tau_s[near]), weights=weights[near]))),
+        scales_with=name,
+        sign=sign,
+        explained=share,
+        others={other: value for other, value in shares.items() if other != name},
+    )
+
+
+class _Products:
+    """Products of columns and of columns with the target, trial by trial: all that least squares needs."""
+
+    def __init__(self, columns: Array, target: Array, edges: npt.NDArray[np.int64]) -> None:
+        self.columns, self.target = columns, target
+        self.parts = [slice(a, b) for a, b in itertools.pairwise(edges)]
+        self.gram = np.array([columns[s].T @ columns[s] for s in self.parts])
+        self.across = np.array([columns[s].T @ target[s] for s in self.parts])
+        # In units of columns before the fit took its part: a memory that it took stays small.
+        self.ridge = _RIDGE * target.size * np.eye(columns.shape[1])
+
+    def weights(self, sign: int, without: int | None) -> Array:
+        """Not negative, from all trials but one, shape (columns,)."""
+        chosen = [i for i in range(len(self.parts)) if i != without]
+        root = cholesky(self.gram[chosen].sum(axis=0) + self.ridge, lower=True)
+        found: Array = nnls(root.T, sign * solve_triangular(root, self.across[chosen].sum(axis=0), lower=True))[0]
+        return found
+
+    def explained(self, sign: int) -> float:
+        """Share of the mean square that weights from the other trials explain (with one trial: its own)."""
+        single = len(self.parts) == 1
+        missed = 0.0
+        for i, part in enumerate(self.parts):
+            told = self.columns[part] @ (sign * self.weights(sign, None if single else i))
+            missed += float(np.sum((self.target[part] - told) ** 2))
+        return 1.0 - missed / float(self.target @ self.target)
+
+
+def scales(
+    residuals: Sequence[Residual], fit: LinearFit, scalings: Mapping[str, Sequence[Array]]
+) -> dict[str, Array]:
+    """What a law may scale with, all trials one below the other, the constant first."""
+    check(residuals)
+    sizes = [r.time_s.size for r in residuals]
+    if sum(sizes) != fit.slopes.shape[0]:
+        raise UserError(f"residuals have {sum(sizes)} samples, the fit's slopes {fit.slopes.shape[0]}; give the same")
+    out = {CONSTANT: np.ones(sum(sizes))}
+    for name, arrays in scalings.items():
+        if [a.size for a in arrays] != sizes:
+            found = [a.size for a in arrays]
+            raise UserError(f"scaling '{name}' has {found} samples, the residuals {sizes}; give the same")
+        out[name] = np.concatenate([np.asarray(a, dtype=np.float64) for a in arrays])
+        if not np.all(np.isfinite(out[name])):
+            raise UserError(f"scaling '{name}' is not finite; leave it out")
+    return out

@@ -1,0 +1,192 @@
+"""Whether, where and when recording and fitted model differ by more than noise: a bootstrap that refits.
+
+Samples of a residual resemble each other over tens of milliseconds, and a fit takes out of noise what its coordinates
+can follow. So the null is made of noise of the recordings' own size and colour, drawn with what is not known of them,
+put through the fit's normal equations together with what its priors cost, and looked at in the same cells. The largest
+over all cells counts (step-down maxima: Westfall and Young, Resampling-Based Multiple Testing (1993)), so that the
+chance of any false cell is what a p-value says.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.diagnose.cells import Cell, Residual, cut, exceeding, mean, phase_names, rms
+from xb_muscle_ros.diagnose.linear_fit import LinearFit
+from xb_muscle_ros.diagnose.noise_model import NoiseModel
+from xb_muscle_ros.errors import UserError
+
+Array = npt.NDArray[np.float64]
+
+# A mismatch below this is of no use to anyone, F0, whatever its p-value.
+FLOOR_F0 = 0.003
+_SIGMAS = 3.0
+# Numbers held at a time.
+_AT_ONCE = 3_000_000
+_LEAST_F0 = 1e-12
+
+
+@dataclass(frozen=True)
+class Significance:
+    """The cells of a residual against noise that was fitted in the same way.
+
+    Attributes:
+        residuals, cells: what was looked at; arrays below go with `cells`.
+        rms_f0, mean_f0: of measured minus simulated force, F0.
+        p_value: chance that noise makes any cell stand out as much, so that all cells can be looked at together.
+        floor_f0: a cell counts only above this: the practical floor or three standard deviations of its null.
+        overall_rms_f0: over all samples of all trials.
+        overall_null_f0: what noise reaches of that in 95 of 100 draws.
+        overall_p: chance that noise makes some cell, or the whole, stand out as much.
+        practical_f0: the practical floor.
+    """
+
+    residuals: tuple[Residual, ...]
+    cells: tuple[Cell, ...]
+    rms_f0: Array
+    mean_f0: Array
+    p_value: Array
+    floor_f0: Array
+    overall_rms_f0: float
+    overall_null_f0: float
+    overall_p: float
+    practical_f0: float
+
+    def counts(self, alpha: float = 0.05) -> npt.NDArray[np.bool_]:
+        """Cells that stand out and are large enough to matter, shape (cells,)."""
+        found: npt.NDArray[np.bool_] = (self.p_value <= alpha) & (self.rms_f0 > self.floor_f0)
+        return found
+
+    def detected(self, alpha: float = 0.05) -> bool:
+        """Whether there is a mismatch: some cell counts, or the whole stands out and exceeds the practical floor."""
+        whole = self.overall_p <= alpha and self.overall_rms_f0 > max(self.practical_f0, self.overall_null_f0)
+        return whole or bool(np.any(self.counts(alpha)))
+
+    def mismatch(self, alpha: float = 0.05) -> list[dict[str, Any]]:
+        """Cells that count, largest first, as rows of plain data; sizes in F0.
+
+        The times are those between which the smoothed residual exceeds the cell's floor.
+        """
+        values = np.concatenate([r.value_f0 for r in self.residuals])
+        times = np.concatenate([r.time_s for r in self.residuals])
+        rows = []
+        for i in sorted(np.flatnonzero(self.counts(alpha)), key=lambda i: -float(self.rms_f0[i])):
+            cell = self.cells[i]
+            here = slice(cell.begin, cell.end)
+            start_s, end_s = exceeding(times[here], values[here], float(self.floor_f0[i]))
+            rows.append(
+                {
+                    "trial": cell.trial,
+                    "phase": cell.phase,
+                    "start_s": start_s,
+                    "end_s": end_s,
+                    "size_f0": float(self.rms_f0[i]),
+                    "mean_f0": float(self.mean_f0[i]),
+                    "sign": 1 if self.mean_f0[i] >= 0.0 else -1,
+                    "p_value": float(self.p_value[i]),
+                }
+            )
+        return rows
+
+    def map(self) -> dict[str, Any]:
+        """Trials by phases, as plain data; None where a trial lacks a phase."""
+        trials, phases = [r.trial for r in self.residuals], phase_names(self.cells)
+        out: dict[str, Any] = {"trials": trials, "phases": phases}
+        for name, values in (("rms_f0", self.rms_f0), ("mean_f0", self.mean_f0), ("p_value", self.p_value)):
+            rows: list[list[float | None]] = [[None] * len(phases) for _ in trials]
+            for cell, value in zip(self.cells, values, strict=True):
+                rows[trials.index(cell.trial)][phases.index(cell.phase)] = float(value)
+            out[name] = rows
+        return out
+
+
+def significance(
+    residuals: Sequence[Residual],
+    fit: LinearFit,
+    noise: NoiseModel,
+    draws: int = 500,
+    seed: int = 1,
+    floor_f0: float = FLOOR_F0,
+) -> Significance:
+    """Compare what a fit left with what it would have left of noise.
+
+    Args:
+        residuals: of all trials, after the fit.
+        fit: its normal equations, samples in the order of the residuals.
+        noise: of the trials; others may be among them.
+        draws: of noise; no p-value is below 1/(draws + 1).
+        seed: of the draws.
+        floor_f0: the practical floor, F0.
+
+    Raises:
+        UserError: residuals that cannot be looked at, samples that are not those of the fit, a trial of unknown noise.
+    """
+    cells = cut(residuals)
+    values = np.concatenate([r.value_f0 for r in residuals])[:, None]
+    null, whole = [], []
+    for drawn in null_residuals(residuals, fit, noise, draws, seed):
+        null.append(rms(cells, drawn))
+        whole.append(np.sqrt(np.mean(drawn**2, axis=0)))
+    of_cells, of_whole = np.concatenate(null, axis=1), np.concatenate(whole)
+    found, overall = rms(cells, values)[:, 0], float(np.sqrt(np.mean(values**2)))
+    p = step_down(np.append(found, overall), np.vstack([of_cells, of_whole]))
+    return Significance(
+        residuals=tuple(residuals),
+        cells=cells,
+        rms_f0=found,
+        mean_f0=mean(cells, values)[:, 0],
+        p_value=p[:-1],
+        floor_f0=np.maximum(floor_f0, _SIGMAS * np.sqrt(np.mean(of_cells**2, axis=1))),
+        overall_rms_f0=overall,
+        overall_null_f0=float(np.quantile(of_whole, 0.95)),
+        overall_p=float(p.min()),
+        practical_f0=floor_f0,
+    )
+
+
+def null_residuals(
+    residuals: Sequence[Residual], fit: LinearFit, noise: NoiseModel, draws: int, seed: int
+) -> Iterator[Array]:
+    """What the fit would leave if there were only noise, shapes (samples, some), `draws` columns in all, F0.
+
+    Raises:
+        UserError: see `significance`.
+    """
+    sizes = [r.time_s.size for r in residuals]
+    if sum(sizes) != fit.slopes.shape[0]:
+        raise UserError(f"residuals have {sum(sizes)} samples, the fit's slopes {fit.slopes.shape[0]}; give the same")
+    if draws < 20:
+        raise UserError(f"{draws} draws of noise; at least 20 are needed")
+    chosen = noise.of([r.trial for r in residuals])
+    random = np.random.default_rng(seed)
+    for part in np.array_split(np.arange(draws), math.ceil(draws * sum(sizes) / _AT_ONCE)):
+        yield fit.left(chosen.draw(sizes, part.size, random)) + fit.pulled(part.size, random)
+
+
+def step_down(found: Array, null: Array) -> Array:
+    """Family-wise p-values of sizes, shape (n,).
+
+    Sizes are compared on a logarithmic scale in standard deviations of their own null, so that a noisy cell does not
+    hide the others.
+
+    Args:
+        found: shape (n,), not negative.
+        null: shape (n, draws).
+    """
+    log = np.log(np.maximum(null, _LEAST_F0))
+    centre, sd = np.mean(log, axis=1), np.maximum(np.std(log, axis=1), 1e-6)
+    drawn = (log - centre[:, None]) / sd[:, None]
+    size = (np.log(np.maximum(found, _LEAST_F0)) - centre) / sd
+    order = np.argsort(-size)
+    # The largest of those that have not stood out more.
+    largest = np.maximum.accumulate(drawn[order][::-1], axis=0)[::-1]
+    p = (1.0 + np.count_nonzero(largest >= size[order][:, None], axis=1)) / (1.0 + null.shape[1])
+    out = np.empty(found.size)
+    out[order] = np.maximum.accumulate(p)
+    return out
