@@ -11,7 +11,7 @@ from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.models.parameters import PARAMETERS
-from xb_muscle_ros.models.registry import SWAPS, split_set, with_mechanisms
+from xb_muscle_ros.models.registry import split_set, with_mechanisms
 
 Starts = tuple[Mapping[str, float], ...]
 
@@ -162,8 +162,3 @@ def applicable(model: str) -> tuple[Entry, ...]:
             continue
         found.append(entry)
     return tuple(found)
-
-
-def is_swap(name: Name) -> bool:
-    """Whether a mechanism takes the place of a block, so that its absence may be another model."""
-    return name.value in SWAPS

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
+from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.study import SCALE, Explanation, Study
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.coordinates import fault_coordinates
@@ -149,8 +149,3 @@ def residuals(study: Study, fit: Fit) -> dict[str, Array]:
     problem = fit.problem(study)
     predicted = problem.predicted(problem.start)
     return {t.name: t.measured_f0 - p for t, p in zip(problem.trials, predicted, strict=True)}
-
-
-def is_fault(name: Name) -> bool:
-    """Whether a name is a fault of the measurement."""
-    return name in MEASUREMENT

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.catalogue import Entry, applicable, is_swap
+from xb_muscle_ros.diagnose.catalogue import Entry, applicable
+from xb_muscle_ros.diagnose.linear_fit import LinearFit
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.study import SCALE, Explanation, Study, entry_starts
@@ -49,17 +50,13 @@ class Linear:
 
     Attributes:
         problem: with the best point as its start.
-        residual_f0: measured less predicted force of all training samples.
-        slopes: of the forces by the coordinates.
-        weights: of the samples.
-        inverse: of the curvature, priors included.
+        residual_f0: measured less predicted force of all trials, one below the other.
+        fit: its normal equations, without coordinates at a bound.
     """
 
     problem: Problem
     residual_f0: Array
-    slopes: Array
-    weights: Array
-    inverse: Array
+    fit: LinearFit
 
     @staticmethod
     def of(study: Study, fit: Fit) -> Linear:
@@ -67,25 +64,20 @@ class Linear:
         problem = fit.problem(study)
         objective = Objective(Training(problem), SCALE)
         slopes, _ = objective.training.slopes(problem.start)
-        weights = objective.weights()
+        lower, upper = problem.bounds
+        margin = 1e-6 * np.maximum(1.0, np.abs(upper - lower))
+        free = (problem.start > lower + margin) & (problem.start < upper - margin)
         sds = np.array([c.prior_sd for c in problem.coordinates])
-        weighted = slopes * weights[:, None]
-        curvature = weighted.T @ weighted + np.diag(np.where(np.isfinite(sds), sds**-2.0, 0.0))
+        prior = np.where(np.isfinite(sds), sds**-2.0, 0.0)
         residual = objective.training.measured - objective.training.force(problem.start)
-        return Linear(problem, residual, slopes, weights, np.linalg.pinv(curvature, hermitian=True))
-
-    def left(self, columns: Array) -> Array:
-        """What no coordinate of the fit can do of some changes of force, shape (samples, n)."""
-        pulled = self.slopes.T @ (columns * self.weights[:, None] ** 2)
-        projected: Array = columns - self.slopes @ (self.inverse @ pulled)
-        return projected
+        return Linear(problem, residual, LinearFit(slopes[:, free], objective.weights(), prior[free]))
 
     def gain(self, columns: Array, prior_sd: Array) -> tuple[float, Array]:
         """By how much the cost falls with further coordinates of these slopes and priors around 0, and their values."""
-        left = self.left(columns) * self.weights[:, None]
-        raw = columns * self.weights[:, None]
+        left = self.fit.left(columns) * self.fit.weights[:, None]
+        raw = columns * self.fit.weights[:, None]
         curvature = raw.T @ left + np.diag(prior_sd**-2.0)
-        pull = left.T @ (self.residual_f0 * self.weights)
+        pull = left.T @ (self.residual_f0 * self.fit.weights)
         values = np.linalg.solve(curvature, pull)
         return 0.5 * float(pull @ values), values
 
@@ -106,7 +98,7 @@ def _faults(study: Study, fit: Fit, linear: Linear) -> Iterator[Screened]:
         columns, _ = training.slopes_by(problem.start, own)
         gain, values = linear.gain(columns, np.full(len(own), FAULTS[name.value].sd))
         start = {problem.coordinates[j].label: float(v) for j, v in zip(own, values, strict=True)}
-        signature = linear.left(columns)[:, 0] if len(own) == 1 else np.empty(0)
+        signature = linear.fit.left(columns)[:, 0] if len(own) == 1 else np.empty(0)
         yield Screened(name, gain, signature, ({**fit.values, **start},))
 
 
@@ -152,7 +144,7 @@ def _along_lines(
         if gain > best.gain:
             share = float(np.sign(share) * np.clip(abs(share), _LEAST_SHARE, _MOST_SHARE))
             begun = {**start, entry.effect: share * effect}
-            best = Screened(entry.name, gain, linear.left(column[:, None])[:, 0], (begun,))
+            best = Screened(entry.name, gain, linear.fit.left(column[:, None])[:, 0], (begun,))
     return best
 
 
@@ -163,8 +155,3 @@ def overlap(a: Array, b: Array, weights: Array) -> float:
     x, y = a * weights, b * weights
     norm = float(np.linalg.norm(x) * np.linalg.norm(y))
     return float(x @ y) / norm if norm > 0.0 else 0.0
-
-
-def only_a_fit_can_tell(screened: Screened) -> bool:
-    """Whether a candidate cannot be judged along a line: its absence is another model."""
-    return is_swap(screened.name) and bool(np.isnan(screened.gain))

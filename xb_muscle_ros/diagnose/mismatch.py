@@ -1,0 +1,132 @@
+"""What a fit left, seen by the statistics: residuals with their trials' facts, significance, law, flexible bound."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.diagnose.cells import Residual
+from xb_muscle_ros.diagnose.flexible import flexible_fit
+from xb_muscle_ros.diagnose.kernel import Law, law
+from xb_muscle_ros.diagnose.linear_fit import LinearFit
+from xb_muscle_ros.diagnose.noise_model import NoiseModel, isometric_window, noise_model
+from xb_muscle_ros.diagnose.refit import Fit
+from xb_muscle_ros.diagnose.screen import Linear
+from xb_muscle_ros.diagnose.significance import Significance, significance
+from xb_muscle_ros.diagnose.study import Study
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.trials.trial import Trial
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """The trials themselves beside the study that is made of them.
+
+    Attributes:
+        trials: in the order of the study.
+        noise: of each.
+        draws: of the bootstrap.
+        seed: of its draws.
+    """
+
+    trials: tuple[Trial, ...]
+    noise: NoiseModel
+    draws: int
+    seed: int
+
+    @staticmethod
+    def of(trials: Sequence[Trial], draws: int, seed: int) -> Recordings:
+        """With the noise that their isometric windows show.
+
+        Raises:
+            UserError: no trial holds still for long enough.
+        """
+        return Recordings(tuple(trials), noise_model([isometric_window(t) for t in trials]), draws, seed)
+
+    def residuals(self, study: Study, linear: Linear) -> list[Residual]:
+        """What a fit left of every trial."""
+        edges = np.cumsum([0, *(t.measured_f0.size for t in study.trials)])
+        found = []
+        for trial, fitted, begin, end in zip(self.trials, study.trials, edges[:-1], edges[1:], strict=True):
+            found.append(
+                Residual(
+                    trial=fitted.name,
+                    pca=trial.facts.pca,
+                    time_s=fitted.force_time_s,
+                    value_f0=linear.residual_f0[begin:end],
+                    phases=trial.facts.phases,
+                    length_l0=np.interp(fitted.force_time_s, fitted.time_s, fitted.length_l0),
+                    calcium_um=np.interp(fitted.force_time_s, fitted.time_s, fitted.calcium_um),
+                )
+            )
+        return found
+
+    def significance(self, study: Study, linear: Linear) -> Significance:
+        """Of what a fit left."""
+        return significance(self.residuals(study, linear), linear.fit, self.noise, self.draws, self.seed)
+
+    def noise_rms_f0(self, study: Study) -> float:
+        """Root-mean-square of the noise over all samples, F0."""
+        names = [t.name for t in study.trials]
+        sizes = np.array([t.measured_f0.size for t in study.trials])
+        sds = np.array([noise.sd_f0 for noise in self.noise.of(names).trials])
+        return float(np.sqrt(np.average(sds**2, weights=sizes)))
+
+    def law(self, study: Study, linear: Linear) -> Law | None:
+        """The law of what a fit left."""
+        return law(self.residuals(study, linear), linear.fit, _scalings(study, linear))
+
+    def flexible_rmsd_f0(self, study: Study, linear: Linear, folds: Sequence[frozenset[str]]) -> float | None:
+        """Held-out RMSD of a flexible discrepancy, F0: the law of nothing in particular, learnt from other trials."""
+        found = self.residuals(study, linear)
+        scalings = _scalings(study, linear)
+        squares, samples = 0.0, 0
+        for fold in folds:
+            held = [r.trial in fold for r in found]
+            weights = linear.fit.weights * np.repeat([0.0 if h else 1.0 for h in held], [r.time_s.size for r in found])
+            without = LinearFit(linear.fit.slopes, weights, linear.fit.prior)
+            # The coordinates as they would be had these trials not been fitted, to first order.
+            value = without.left(linear.residual_f0[:, None])[:, 0]
+            edges = np.cumsum([0, *(r.time_s.size for r in found)])
+            here = [r._replace(value_f0=value[a:b]) for r, a, b in zip(found, edges[:-1], edges[1:], strict=True)]
+            if all(held):
+                return None
+            told = flexible_fit(here, held, without, scalings).predicted_f0
+            left = [r for r, h in zip(here, held, strict=True) if h]
+            for r, prediction in zip(left, told, strict=True):
+                squares += float(np.sum((r.value_f0 - prediction) ** 2))
+                samples += r.time_s.size
+        return float(np.sqrt(squares / samples)) if samples else None
+
+
+def _scalings(study: Study, linear: Linear) -> dict[str, list[Array]]:
+    """What a law may scale with, at the times of the force: activation, calcium and force."""
+    muscle = Muscle(linear.problem.fibre_at(linear.problem.start))
+    activation, calcium, force = [], [], []
+    for trial in study.trials:
+        state = muscle.settle(float(trial.length_l0[0]), float(trial.calcium_um[0]))
+        out = muscle.outputs_of(muscle.run(state, trial.dt_s, trial.length_l0, trial.calcium_um))
+        activation.append(np.interp(trial.force_time_s, trial.time_s, out["n_on"]))
+        force.append(np.interp(trial.force_time_s, trial.time_s, out["force_ce_f0"]))
+        given = np.interp(trial.force_time_s, trial.time_s, trial.calcium_um)
+        calcium.append(given / (given + 1.0))
+    return {"activation": activation, "calcium": calcium, "force": force}
+
+
+def simulated(study: Study, fit: Fit) -> list[Array]:
+    """Recorded force of every trial at the times that count by a fit, F0."""
+    problem = fit.problem(study)
+    return problem.predicted(problem.start)
+
+
+def rmsd(measured: Sequence[Array], predicted: Sequence[Array]) -> float:
+    """Root-mean-square difference over all samples of all trials, F0."""
+    squares = sum(float(np.sum((m - p) ** 2)) for m, p in zip(measured, predicted, strict=True))
+    return float(np.sqrt(squares / sum(m.size for m in measured)))
+
+

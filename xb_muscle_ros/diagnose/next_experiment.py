@@ -1,0 +1,121 @@
+"""The next experiment: from a menu of protocols the one on which two explanations differ most."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from xb_muscle_ros.diagnose.refit import Fit
+from xb_muscle_ros.diagnose.study import Explanation, Study
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.trials.trial import Array, Phase, Trial, TrialFacts
+
+# Menu: speed and amplitude of a ramp, hold after it, length the fibre starts from.
+_SPEEDS_L0_PER_S = (0.05, 0.5, 2.0)
+_AMPLITUDES_L0 = (0.04, -0.04)
+_LENGTHS_L0 = (0.0, 0.05)
+_LEAD_S, _HOLD_S = 0.2, 1.0
+_RATE_HZ = 1000.0
+
+
+class Protocol(NamedTuple):
+    """One entry of the menu.
+
+    Attributes:
+        words: what is done.
+        trial: the inputs, no force.
+    """
+
+    words: str
+    trial: Trial
+
+
+class Proposal(NamedTuple):
+    """What to do next.
+
+    Attributes:
+        protocol: what to record.
+        separates: labels of the two explanations.
+        difference_f0: root-mean-square by which they differ there.
+    """
+
+    protocol: Protocol
+    separates: tuple[str, str]
+    difference_f0: float
+
+
+def menu(fibre: str, pcas: Sequence[float]) -> list[Protocol]:
+    """Ramps and holds at some pCa, fast and slow, up and down, from rest length and from a longer one."""
+    found = []
+    for pca in pcas:
+        for start in _LENGTHS_L0:
+            for amplitude in _AMPLITUDES_L0:
+                for speed in _SPEEDS_L0_PER_S:
+                    found.append(_ramp(fibre, pca, start, amplitude, speed))
+    return found
+
+
+def _ramp(fibre: str, pca: float, start_l0: float, amplitude_l0: float, speed: float) -> Protocol:
+    ramp_s = abs(amplitude_l0) / speed
+    corners_s = np.cumsum([0.0, _LEAD_S, ramp_s, _HOLD_S])
+    corners_l0 = np.array([start_l0, start_l0, start_l0 + amplitude_l0, start_l0 + amplitude_l0])
+    count = int(np.floor(corners_s[-1] * _RATE_HZ * (1.0 + 1e-12))) + 1
+    time_s = np.round(np.arange(count) / _RATE_HZ * 1e9) / 1e9
+    kind = "stretch" if amplitude_l0 > 0.0 else "shortening"
+    phases = (
+        Phase("isometric", 0.0, float(corners_s[1])),
+        Phase(kind, float(corners_s[1]), float(corners_s[2])),
+        Phase("hold" if amplitude_l0 > 0.0 else "recovery", float(corners_s[2]), float(corners_s[3])),
+    )
+    name = f"{kind}_{100 * abs(amplitude_l0):g}pct_{speed:g}_from_{100 * start_l0:g}pct_pca{10 * pca:g}"
+    where = "rest length" if start_l0 == 0.0 else f"{100 * start_l0:g} % L0 beyond rest length"
+    words = (
+        f"{kind} by {100 * abs(amplitude_l0):g} % L0 at {speed:g} L0/s from {where} at pCa {pca:g}, "
+        f"then hold for {_HOLD_S:g} s"
+    )
+    trial = Trial(
+        TrialFacts(fibre=fibre, trial=name, pca=pca, phases=phases, source="proposed by xb_muscle diagnose"),
+        time_s,
+        1.0 + np.interp(time_s, corners_s, corners_l0),
+        np.zeros(1),
+        np.array([10.0 ** (6.0 - pca)]),
+    )
+    return Protocol(words, trial)
+
+
+def propose(study: Study, one: Fit, other: Fit, pcas: Sequence[float]) -> Proposal | None:
+    """The protocol on which two fits differ most; None where neither has a solution on any.
+
+    Args:
+        study: all trials.
+        one, other: fits of rival explanations; faults have no part in it, the next recording has its own.
+        pcas: at which solutions are at hand.
+    """
+    muscles = [_muscle(study, fit) for fit in (one, other)]
+    best: Proposal | None = None
+    for protocol in menu(study.fibre.name, pcas):
+        try:
+            forces: list[Array] = [simulate_trial(muscle, protocol.trial).force_n for muscle in muscles]
+        except UserError:
+            continue
+        apart = float(np.sqrt(np.mean((forces[0] - forces[1]) ** 2)))
+        if best is None or apart > best.difference_f0:
+            best = Proposal(protocol, (one.explanation.label, other.explanation.label), apart)
+    return best
+
+
+def _muscle(study: Study, fit: Fit) -> Muscle:
+    values: Mapping[str, float] = {k: v for k, v in fit.values.items() if "[" not in k}
+    problem = study.problem(Explanation(fit.explanation.mechanisms), values)
+    return Muscle(problem.fibre_at(problem.start))
+
+
+def scaled(trial: Trial, reference_length_m: float, f0_n: float) -> Trial:
+    """The protocol in a fibre's own units."""
+    facts = replace(trial.facts, reference_length_m=reference_length_m, f0_n=f0_n)
+    return replace(trial, facts=facts, length_m=trial.length_m * reference_length_m)

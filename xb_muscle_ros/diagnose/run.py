@@ -1,0 +1,217 @@
+"""A whole diagnosis: from bags to `diagnosis.json`, the augmented fibre file and the report."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.diagnose.crossval import HeldOut, folds_of, held_out
+from xb_muscle_ros.diagnose.mismatch import Recordings, rmsd, simulated
+from xb_muscle_ros.diagnose.names import MECHANISMS, Name
+from xb_muscle_ros.diagnose.next_experiment import Proposal, propose
+from xb_muscle_ros.diagnose.outcome import Outcome, as_json, write
+from xb_muscle_ros.diagnose.profile import Known, known
+from xb_muscle_ros.diagnose.refit import Fit
+from xb_muscle_ros.diagnose.screen import Linear
+from xb_muscle_ros.diagnose.search import QUICK, Effort, Search, Searcher, penalised
+from xb_muscle_ros.diagnose.significance import Significance
+from xb_muscle_ros.diagnose.study import Explanation, Study
+from xb_muscle_ros.diagnose.verdict import Decision, Evidence, decide
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.data import fit_trials
+from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
+from xb_muscle_ros.trials.bags import find_bags, read_trial
+from xb_muscle_ros.trials.trial import Trial
+from xb_muscle_ros.work import Options
+
+# Below this chance the base is taken to miss something.
+_ALPHA = 0.01
+
+
+def diagnose_bags(
+    bags: Sequence[Path],
+    fiber: str | Path,
+    out: Path,
+    quick: bool = False,
+    seed: int = 1,
+    model: str | None = None,
+    method: str | None = None,
+    options: Options | None = None,
+) -> dict[str, Any]:
+    """Diagnose the trials of some bags and write what was found.
+
+    Args:
+        bags: bags or folders of bags, in the order of recording.
+        fiber: fibre file or name: where the base model starts.
+        out: folder for `diagnosis.json`, `augmented.yaml`, `report.html`, `traces.npz` and the next experiment's bag.
+        quick: look less hard.
+        seed: of the bootstrap.
+        model, method: of the fibre file; its own where None.
+        options: where work is done; finished work is kept in `out`.
+
+    Returns:
+        what `diagnosis.json` holds.
+
+    Raises:
+        UserError: bags that cannot be read or do not belong together, no force, no solution at the start.
+    """
+    trials = [read_trial(path) for path in find_bags(list(bags))]
+    if not trials:
+        raise UserError("there are no bags to diagnose; give at least one")
+    fibre = load_fibre(fiber, model, method)
+    options = options or Options(processes=0, quiet=True)
+    options = replace(options, journal=options.journal or out / "journal.jsonl")
+    outcome = diagnose(trials, fibre, QUICK if quick else Effort(), seed, options)
+    found = as_json(outcome, quick)
+    write(out, outcome, found)
+    return found
+
+
+def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, options: Options) -> Outcome:
+    """Diagnose trials of one fibre.
+
+    Raises:
+        UserError: see `diagnose_bags`.
+    """
+    begun = time.monotonic()
+    fibres = dict.fromkeys(t.facts.fibre for t in trials)
+    if len(fibres) > 1:
+        raise UserError(f"trials are of fibres {', '.join(fibres)}; diagnose one fibre at a time")
+    warnings = [w for t in trials for w in t.warnings]
+    # Released sets were fitted with smooth functions; what they blur is no physics to be looked for.
+    fibre = changed(fibre, {"smoothing": 0.0}, "diagnosis")
+    study = Study(fibre, fit_trials(trials, [False] * len(trials), whole=True))
+    recordings = Recordings.of(trials, effort.draws, seed)
+    start = Fit(Explanation(), {}, np.inf, np.inf, 0)
+    measured = [t.measured_f0 for t in study.trials]
+    start_forces = simulated(study, start)
+
+    def significant(of: Study, fit: Fit) -> bool:
+        found = recordings.significance(of, Linear.of(of, fit))
+        return found.detected(_ALPHA)
+
+    searcher = Searcher(study, effort, options)
+    search = searcher.search(significant)
+    study = searcher.study
+    before = recordings.significance(study, search.linear)
+    detected = before.detected(_ALPHA)
+    if detected and search.final is not search.base:
+        searcher.compete(search)
+    last = Linear.of(study, search.final)
+    after = recordings.significance(study, last)
+    folds = folds_of(study, effort.folds)
+    scored = _to_score(search, effort.rivals) if detected else [search.base]
+    scores = held_out(study, scored, folds, max(6, effort.most // 2), options) if folds else {}
+    flexible = recordings.flexible_rmsd_f0(study, search.linear, folds) if folds and detected else None
+    lead = _lead(search)
+    interval = known(study, search.final, lead, effort.closure > 1, options) if lead and detected else None
+    decision = decide(
+        Evidence(
+            search=search,
+            start_rmsd_f0=rmsd(measured, start_forces),
+            noise_f0=recordings.noise_rms_f0(study),
+            detected=detected,
+            p_value=before.overall_p,
+            heldout=scores,
+            flexible_f0=flexible,
+            interval=interval.interval if interval else None,
+            at_bound=interval.at_bound if interval else False,
+            cleaned=_cleaned(before, after),
+        )
+    )
+    return Outcome(
+        trials=tuple(trials),
+        study=study,
+        search=search,
+        recordings=recordings,
+        before=before,
+        after=after,
+        last=last,
+        heldout=scores,
+        flexible_f0=flexible,
+        law=recordings.law(study, search.linear) if detected else None,
+        known=interval,
+        decision=decision,
+        proposal=_proposal(search, decision, trials),
+        start_forces=start_forces,
+        warnings=tuple(warnings),
+        missing=tuple(_missing(recordings, search, folds, measured)),
+        seconds=time.monotonic() - begun,
+        seed=seed,
+    )
+
+
+def _to_score(search: Search, rivals: int) -> list[Fit]:
+    """Fits whose held-out scores are worth knowing: base, final and the final's best rivals."""
+    found = {search.base.explanation.label: search.base, search.final.explanation.label: search.final}
+    for name in search.final.explanation.names:
+        for fit in search.rivals(name)[:rivals]:
+            found.setdefault(fit.explanation.label, fit)
+    if not search.final.explanation.names:
+        for fit in sorted(search.fits.values(), key=penalised)[:rivals]:
+            found.setdefault(fit.explanation.label, fit)
+    return list(found.values())
+
+
+def _lead(search: Search) -> Name | None:
+    """The mechanism without which the final explanation would lose most."""
+
+    def rise(name: Name) -> float:
+        without = search.fits.get(search.final.explanation.without(name).label, search.base)
+        return without.cost - search.final.cost
+
+    return max(search.final.explanation.mechanisms, key=rise, default=None)
+
+
+def _cleaned(before: Significance, after: Significance) -> float:
+    """Share of the located cells' mean square that is gone, beyond what noise leaves there."""
+    counted = before.counts(_ALPHA)
+    if not np.any(counted):
+        counted = before.rms_f0 >= np.max(before.rms_f0)
+    sizes = np.array([cell.end - cell.begin for cell in before.cells], dtype=np.float64)
+    was, now = (float(np.sum((s.rms_f0**2 * sizes)[counted])) for s in (before, after))
+    return 1.0 - now / was if was > 0.0 else 0.0
+
+
+def _proposal(search: Search, decision: Decision, trials: Sequence[Trial]) -> Proposal | None:
+    """What would tell the answer from its nearest rival, or from having none."""
+    pcas = sorted({t.facts.pca for t in trials if t.facts.pca is not None})
+    chosen = sorted({pcas[0], pcas[len(pcas) // 2], pcas[-1]}) if pcas else [6.2]
+    order = sorted(search.fits.values(), key=penalised)
+    of_mechanisms = [f for f in order if any(n in MECHANISMS for n in f.explanation.names)]
+    first = search.final if search.final.explanation.mechanisms else next(iter(of_mechanisms), None)
+    if first is None:
+        return None
+    others = [f for f in of_mechanisms if f.explanation.mechanisms != first.explanation.mechanisms]
+    ties = [f for f in others if set(f.explanation.names) & set(decision.ties)]
+    second = next(iter([*ties, *others]), search.base)
+    return propose(search.study, first, second, chosen)
+
+
+def _missing(
+    recordings: Recordings, search: Search, folds: Sequence[frozenset[str]], measured: Sequence[Any]
+) -> list[str]:
+    """What a firmer answer would need, a line each."""
+    lines = []
+    if not folds:
+        lines.append("at least three trials, so that some can be held out: without that no mechanism is named")
+    noise = recordings.noise_rms_f0(search.study)
+    if noise > 0.02:
+        lines.append(f"force with less noise: {100 * noise:.1f} % F0 hides what is looked for")
+    spread = float(np.std(np.concatenate(list(measured))))
+    if search.base.rmsd_f0 > 0.5 * spread:
+        lines.append(
+            "recordings that the model describes at all: after the fit half of the force's variation is left; check "
+            "that channels, units, calcium and fibre belong together"
+        )
+    if all(t.facts.pca is None or t.facts.pca < 8.0 for t in recordings.trials):
+        lines.append("a trial without calcium (pCa 9), which tells passive from active effects")
+    return lines
+
+

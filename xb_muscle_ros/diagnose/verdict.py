@@ -1,0 +1,225 @@
+"""From fits to an answer, and when not to give one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from xb_muscle_ros.diagnose.catalogue import CATALOGUE
+from xb_muscle_ros.diagnose.crossval import HeldOut, difference
+from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name, Verdict
+from xb_muscle_ros.diagnose.refit import Fit
+from xb_muscle_ros.diagnose.search import Search
+
+# Independent differences that a trial tells of, as a rule: residuals of a muscle hang together over a whole phase.
+_TOLD_BY_TRIAL = 2.0
+# A rival is out of the race below this share of the best one's weight.
+_TIE = 0.05
+# Shares of the mismatch's mean square that an answer explains at least, and that a mechanism explains of what was left
+# before it.
+_EXPLAINED, _OWN_SHARE = 0.6, 0.4
+# A mechanism's own doing is at least this large, F0.
+_OWN_F0 = 0.002
+# Of the held-out gain of a discrepancy without physics, an answer reaches this share.
+_OF_FLEXIBLE = 0.5
+# A start whose difference is within this factor of the refitted one needed no refit.
+_AS_GOOD = 1.5
+
+
+class Check(NamedTuple):
+    """One condition of an answer.
+
+    Attributes:
+        name: in words.
+        passed: whether it holds.
+        value: what was found, in words.
+    """
+
+    name: str
+    passed: bool
+    value: str
+
+
+class Decision(NamedTuple):
+    """What the diagnosis says.
+
+    Attributes:
+        verdict: as a whole.
+        answer: names, best first.
+        family: that all names share, or None.
+        confidence: weight of the first name among all that were fitted in its place, times what it explains.
+        checks: conditions of a named mechanism.
+        ties: names that the data do not tell from the first one.
+    """
+
+    verdict: Verdict
+    answer: tuple[Name, ...]
+    family: str | None
+    confidence: float
+    checks: tuple[Check, ...]
+    ties: tuple[Name, ...]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a decision rests on.
+
+    Attributes:
+        search: fits.
+        start_rmsd_f0: of the fibre file as given.
+        noise_f0: root-mean-square of the noise.
+        detected: whether the base leaves more than noise and than is of use.
+        p_value: of what the base leaves.
+        heldout: scores by label.
+        flexible_f0: held-out RMSD of a flexible discrepancy, or None.
+        interval: of the leading mechanism's effect, or None where it has none.
+        at_bound: whether that effect ended at a bound.
+        cleaned: share of the located cells' mean square that is gone afterwards.
+    """
+
+    search: Search
+    start_rmsd_f0: float
+    noise_f0: float
+    detected: bool
+    p_value: float
+    heldout: Mapping[str, HeldOut]
+    flexible_f0: float | None
+    interval: tuple[float, float] | None
+    at_bound: bool
+    cleaned: float
+
+
+def decide(e: Evidence) -> Decision:
+    """The answer that the evidence allows."""
+    search = e.search
+    if not e.detected:
+        fine = e.start_rmsd_f0 <= max(_AS_GOOD * search.base.rmsd_f0, 0.003)
+        return Decision(Verdict.NONE if fine else Verdict.PARAMETERS, (), None, _sure(e.p_value), (), ())
+    explanation = search.final.explanation
+    if not explanation.names:
+        return Decision(Verdict.UNEXPLAINED, (), None, _sure(1.0 - e.p_value), (), ())
+    share = explained(search.base, search.final, e.noise_f0)
+    mechanisms = _by_importance(search, [m for m in explanation.mechanisms if _has_own_doing(search, m, e.noise_f0)])
+    faults = _by_importance(search, explanation.faults)
+    lead = (mechanisms or faults or list(explanation.names))[0]
+    weights = weights_against(search, lead, len(search.study.trials))
+    ties = tuple(n for n, w in weights.items() if n is not lead and w >= _TIE * weights[lead])
+    confidence = weights[lead] * max(0.0, min(1.0, share))
+    checks = _checks(e, lead, share, weights, bool(mechanisms))
+    answer = tuple(dict.fromkeys((*mechanisms, *faults, *ties))) if mechanisms else tuple(dict.fromkeys((*faults, *ties)))
+    family = FAMILY[lead] if all(FAMILY[n] == FAMILY[lead] for n in ties) else None
+    if not mechanisms and not faults:
+        return Decision(Verdict.UNEXPLAINED, (), None, confidence, checks, ties)
+    if family is None:
+        return Decision(Verdict.AMBIGUOUS, answer, None, confidence, checks, ties)
+    if not all(c.passed for c in checks):
+        return Decision(Verdict.UNEXPLAINED, (), None, confidence, checks, ties)
+    verdict = Verdict.PHYSICS if mechanisms else Verdict.MEASUREMENT
+    return Decision(verdict, answer, family, confidence, checks, ties)
+
+
+def _sure(p: float) -> float:
+    return min(max(p, 0.0), 1.0)
+
+
+def explained(before: Fit, after: Fit, noise_f0: float) -> float:
+    """Share of the mean square beyond noise that one fit has over another."""
+    excess = before.rmsd_f0**2 - noise_f0**2
+    return (before.rmsd_f0**2 - after.rmsd_f0**2) / excess if excess > 0.0 else 0.0
+
+
+def _by_importance(search: Search, names: Sequence[Name]) -> list[Name]:
+    """Names by what the cost rises without them."""
+
+    def rise(name: Name) -> float:
+        without = search.fits.get(search.final.explanation.without(name).label, search.base)
+        return without.cost - search.final.cost
+
+    return sorted(names, key=rise, reverse=True)
+
+
+def _has_own_doing(search: Search, name: Name, noise_f0: float) -> bool:
+    """Whether a mechanism does more than tidy up what others left."""
+    without = search.fits.get(search.final.explanation.without(name).label, search.base)
+    own = max(without.rmsd_f0**2 - search.final.rmsd_f0**2, 0.0)
+    return math.sqrt(own) >= _OWN_F0 and explained(without, search.final, noise_f0) >= _OWN_SHARE
+
+
+def weights_against(search: Search, lead: Name, trials: int) -> dict[Name, float]:
+    """Weights of a name and of all that were fitted in its place; they sum to 1.
+
+    The likelihood of differences of unknown size, with as many independent ones as trials have phases to speak of.
+    """
+    told = _TOLD_BY_TRIAL * trials
+    fits = {lead: search.final}
+    for rival in search.rivals(lead):
+        name = next(n for n in rival.explanation.names if n not in search.final.explanation.without(lead).names)
+        fits.setdefault(name, rival)
+    logs = {}
+    for name, fit in fits.items():
+        parameters = 1 if name in MEASUREMENT else len(CATALOGUE[name].parameters)
+        logs[name] = -0.5 * told * math.log(max(fit.cost, 1e-12)) - parameters
+    best = max(logs.values())
+    raw = {name: math.exp(value - best) for name, value in logs.items()}
+    total = sum(raw.values())
+    return {name: value / total for name, value in raw.items()}
+
+
+def _checks(e: Evidence, lead: Name, share: float, weights: Mapping[Name, float], physics: bool) -> tuple[Check, ...]:
+    checks = [
+        Check("the mismatch is no noise (bootstrap p < 0.01)", e.p_value < 0.01, f"p = {e.p_value:.2g}"),
+        Check(
+            f"the answer explains at least {100 * _EXPLAINED:.0f} % of the mismatch",
+            share >= _EXPLAINED,
+            f"{100 * share:.0f} % of its mean square",
+        ),
+        Check(
+            "the places where the mismatch was found are clean afterwards",
+            e.cleaned >= _EXPLAINED,
+            f"{100 * e.cleaned:.0f} % of the mean square there is gone",
+        ),
+    ]
+    if physics:
+        rival = max((w for n, w in weights.items() if n in MEASUREMENT), default=0.0)
+        checks.append(
+            Check(
+                "no fault of the measurement explains as much",
+                rival < _TIE * weights[lead],
+                f"weight of the best one {rival:.2g}",
+            )
+        )
+        if e.interval is not None:
+            apart = not e.interval[0] <= 0.0 <= e.interval[1]
+            checks.append(
+                Check("the interval of its parameter excludes 0", apart, f"{e.interval[0]:.3g} to {e.interval[1]:.3g}")
+            )
+        checks.append(Check("its parameter is off its bounds", not e.at_bound, "at a bound" if e.at_bound else "inside"))
+    checks += _heldout_checks(e)
+    return tuple(checks)
+
+
+def _heldout_checks(e: Evidence) -> list[Check]:
+    base = e.heldout.get(e.search.base.explanation.label)
+    after = e.heldout.get(e.search.final.explanation.label)
+    if base is None or after is None:
+        return [Check("held-out trials are predicted better", False, "too few trials to hold any out")]
+    gain = difference(after, base)
+    found = [
+        Check(
+            "held-out trials are predicted better",
+            after.rmsd_f0 < base.rmsd_f0,
+            f"{100 * base.rmsd_f0:.2f} to {100 * after.rmsd_f0:.2f} % F0, {gain.delta_elpd:.1f} ± {gain.se:.1f}",
+        )
+    ]
+    if e.flexible_f0 is not None and e.flexible_f0 < base.rmsd_f0:
+        of_flexible = (base.rmsd_f0 - after.rmsd_f0) / (base.rmsd_f0 - e.flexible_f0)
+        found.append(
+            Check(
+                "its held-out gain is at least half of what a discrepancy without physics gets",
+                of_flexible >= _OF_FLEXIBLE,
+                f"{of_flexible:.2f} of it",
+            )
+        )
+    return found
