@@ -1,0 +1,36 @@
+"""How what is left remembers the speed of length change: weight against time constant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from xb_muscle_ros.figures.diagnose_common import svg
+from xb_muscle_ros.figures.style import MODEL, SECOND, figure
+
+
+def draw_kernel(facts: Mapping[str, Any]) -> list[str]:
+    """Weights of the exponentials against their time constants, as SVG; none where no kernel was found."""
+    kernel = facts["kernel"]
+    if kernel is None or not kernel["tau_s"] or not kernel["weight_f0"]:
+        return []
+    tau = [1e3 * float(t) for t in kernel["tau_s"]]
+    weight = [100.0 * float(w or 0.0) for w in kernel["weight_f0"]]
+    with figure(120.0, 56.0) as made:
+        axes = made.add_subplot()
+        axes.axhline(0.0, color="black", linewidth=0.5)
+        axes.vlines(tau, 0.0, weight, color=MODEL, linewidth=1.6)
+        axes.plot(tau, weight, "o", color=MODEL, markersize=4)
+        if kernel["time_constant_s"] is not None:
+            at = 1e3 * float(kernel["time_constant_s"])
+            axes.axvline(at, color=SECOND, linewidth=0.9, linestyle=(0, (4, 2)))
+            axes.text(
+                at, 1.01, f"{at:.3g} ms", color=SECOND, fontsize=7.5, ha="center", va="bottom",
+                transform=axes.get_xaxis_transform(),
+            )  # fmt: skip
+        axes.set_xscale("log")
+        axes.set_xlim(min(tau) / 1.5, max(tau) * 1.5)
+        axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+        axes.set_xlabel("Time constant (ms)")
+        axes.set_ylabel("Weight (% F$_0$)")
+        return [svg(made)]
