@@ -26,6 +26,8 @@ Facts = Mapping[str, Any]
 _MOST_CHANGES = 3
 # Parameters that moved less than this share are not worth a word.
 _CHANGED = 0.02
+# Below this share of the mean square a law describes nothing.
+_LAW = 0.2
 
 
 class Piece(NamedTuple):
@@ -196,7 +198,7 @@ def _unexplained(facts: Facts) -> list[Sentence]:
             Piece(f"{percent(bound)} % F0", "flexible_bound"),
             Piece(", so there is something to be found."
                   if _below(bound, facts["before"]["heldout_rmsd_f0"]) else
-                  ", no better than the model: the difference does not repeat from trial to trial."),
+                  ", hardly better than the model: what it learns in some trials does not help in others."),
         ])  # fmt: skip
     out += _by_chance(facts, "A difference this large")
     return out + _next(facts)
@@ -274,7 +276,8 @@ def _conditions(facts: Facts, where: Located) -> str:
     pca_of = {row["trial"]: row["pca"] for row in facts["trials"]}
     names = list(dict.fromkeys(row["trial"] for row in where.rows))
     levels = sorted({float(pca_of[name]) for name in names if pca_of.get(name) is not None}, reverse=True)
-    count = f"of {len(names)} of {len(facts['trials'])} trials"
+    total = len(facts["trials"])
+    count = f"of all {total} trials" if len(names) == total else f"of {len(names)} of {total} trials"
     if not levels:
         return f"of trial {names[0]}" if len(names) == 1 else count
     solutions = f"pCa {levels[0]:g}" if len(levels) == 1 else f"pCa {levels[0]:g} to {levels[-1]:g}"
@@ -373,12 +376,19 @@ def _law(facts: Facts) -> list[Sentence]:
     kernel = facts["kernel"]
     if kernel is None or kernel["time_constant_s"] is None:
         return []
+    share = kernel["explained"]
+    if share is not None and share < _LAW:
+        return [[
+            Piece("It follows no simple memory of the speed of length change: that accounts for "),
+            Piece(f"{100.0 * share:.0f} %", "kernel"),
+            Piece(" of it."),
+        ]]  # fmt: skip
     out = [Piece("What is left follows the speed of length change and fades with a time constant of ")]
     out.append(Piece(f"{quantity(1e3 * kernel['time_constant_s'], 'ms')}", "kernel"))
     if kernel["scales_with"] in SCALES:
-        out.append(Piece(f"; it scales with {SCALES[kernel['scales_with']]}"))
-    if kernel["explained"] is not None:
-        out += [Piece(". This law accounts for "), Piece(f"{100.0 * kernel['explained']:.0f} %", "kernel")]
+        out.append(Piece(f"; it {SCALES[kernel['scales_with']]}"))
+    if share is not None:
+        out += [Piece(". This law accounts for "), Piece(f"{100.0 * share:.0f} %", "kernel")]
         out.append(Piece(" of it, but describes rather than explains"))
     return [[*out, Piece(".")]]
 

@@ -90,13 +90,13 @@ _FAMILIES: Mapping[str, str] = {
 }
 SCALES: Mapping[str, str] = MappingProxyType(
     {
-        "activation": "the activation of the thin filament",
-        "constant": "nothing: it is the same at every activation",
-        "calcium": "the calcium given",
-        "force": "force",
+        "activation": "scales with the activation of the thin filament",
+        "constant": "is the same at every activation",
+        "calcium": "scales with the calcium given",
+        "force": "scales with force",
     }
 )
-"""What a remainder scales with, after the words *it scales with*."""
+"""What a remainder scales with, after its subject."""
 # The scale for likelihood of Mastrandrea et al. 2010 (guidance note of the IPCC on uncertainties): lower limits.
 _LIKELY = (
     (0.99, "virtually certain"),
@@ -159,20 +159,15 @@ def likely(share: float) -> str:
 
 
 def digits(value: float, significant: int = 2) -> str:
-    """A number with so many significant digits at least, never with an exponent between 1e-4 and 1e6."""
+    """A number with so many significant digits at least, without an exponent between 1e-4 and 1e6."""
     size = abs(value)
     if size == 0.0:
         return "0"
     if size < 1e-4 or size >= 1e6:
         return f"{value:.{significant}g}"
-    after = significant - 1
-    for limit in (1.0, 0.1, 0.01, 1e-3, 1e-4):
-        if size >= limit:
-            break
-        after += 1
-    if size >= 10.0:
-        after = max(0, significant - 2)
-    return f"{value:.{after}f}"
+    # The exponent after rounding: 0.0999 is 0.10.
+    exponent = int(f"{value:.{significant - 1}e}".rpartition("e")[2])
+    return f"{value:.{max(0, significant - 1 - exponent)}f}"
 
 
 def percent(value_f0: float) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from xb_muscle_ros.figures.diagnose_common import svg
-from xb_muscle_ros.figures.style import MODEL, SECOND, figure
+from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
 
 def draw_kernel(facts: Mapping[str, Any]) -> list[str]:
@@ -20,7 +20,8 @@ def draw_kernel(facts: Mapping[str, Any]) -> list[str]:
         axes = made.add_subplot()
         axes.axhline(0.0, color="black", linewidth=0.5)
         axes.vlines(tau, 0.0, weight, color=MODEL, linewidth=1.6)
-        axes.plot(tau, weight, "o", color=MODEL, markersize=4)
+        for t, w in zip(tau, weight, strict=True):
+            axes.plot([t], [w], "o", markersize=4 if w else 2.5, color=MODEL if w else DATA)
         if kernel["time_constant_s"] is not None:
             at = 1e3 * float(kernel["time_constant_s"])
             axes.axvline(at, color=SECOND, linewidth=0.9, linestyle=(0, (4, 2)))

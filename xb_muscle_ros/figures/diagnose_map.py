@@ -13,8 +13,7 @@ from xb_muscle_ros.figures.style import figure
 
 _PER_PAGE = 24
 _SIGNIFICANT = 0.05
-_COLOURS = "PuOr_r"
-_DARK = 0.62
+_DARK = 0.75
 
 
 def draw_map(facts: Mapping[str, Any]) -> list[str]:
@@ -68,7 +67,7 @@ def _cells(axis: Any, table: Mapping[str, Any], names: list[str], limit: float) 
         _array(table[key], *shape)[take] * factor
         for key, factor in (("mean_f0", 100.0), ("rms_f0", 100.0), ("p_value", 1.0))
     )
-    image = axis.imshow(mean, cmap=_COLOURS, vmin=-limit, vmax=limit, aspect="auto")
+    image = axis.imshow(mean, cmap=_colours(), vmin=-limit, vmax=limit, aspect="auto")
     for i, j in np.ndindex(mean.shape):
         box = (j - 0.5, i - 0.5)
         if not np.isfinite(mean[i, j]) and not np.isfinite(rms[i, j]):
@@ -78,7 +77,7 @@ def _cells(axis: Any, table: Mapping[str, Any], names: list[str], limit: float) 
             continue
         colour = "white" if abs(mean[i, j]) > _DARK * limit else "black"
         if np.isfinite(mean[i, j]):
-            axis.text(j, i - 0.16, _signed(mean[i, j]), ha="center", va="center", fontsize=6.5, color=colour)
+            axis.text(j, i - 0.16, _signed(mean[i, j], limit), ha="center", va="center", fontsize=6.5, color=colour)
         if np.isfinite(rms[i, j]):
             axis.text(j, i + 0.26, percent(rms[i, j] / 100.0), ha="center", va="center", fontsize=4.8, color=colour)
         if p_value[i, j] < _SIGNIFICANT:
@@ -96,8 +95,14 @@ def _cells(axis: Any, table: Mapping[str, Any], names: list[str], limit: float) 
     return image
 
 
-def _signed(value_percent: float) -> str:
-    text = percent(abs(value_percent) / 100.0) if abs(value_percent) >= 0.005 else "0"
-    if text == "0":
-        return text
-    return ("+" if value_percent > 0.0 else "−") + text
+def _colours() -> Any:
+    """Violet over white to orange, without the ends in which both are black."""
+    import matplotlib as mpl
+
+    return mpl.colors.ListedColormap(mpl.colormaps["PuOr_r"](np.linspace(0.1, 0.9, 256)))
+
+
+def _signed(value_percent: float, limit: float) -> str:
+    """With as many digits in all cells as the largest needs."""
+    text = f"{value_percent:+.{1 if limit >= 10.0 else 2}f}"
+    return text.replace("-", "−") if float(text) else "0"

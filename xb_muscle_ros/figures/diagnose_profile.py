@@ -22,6 +22,8 @@ def draw_profile(facts: Mapping[str, Any]) -> list[str]:
         return []
     x, root = np.array(sorted(points), dtype=np.float64).T
     limit = float(np.sqrt(chi2.ppf(_LEVEL, 1)))
+    from matplotlib.ticker import MaxNLocator
+
     with figure(100.0, 60.0) as made:
         axes = made.add_subplot()
         low, high = profile["interval"] or (None, None)
@@ -32,6 +34,7 @@ def draw_profile(facts: Mapping[str, Any]) -> list[str]:
         axes.axhline(limit, color="black", linewidth=0.6, linestyle=":")
         axes.text(1.0, limit, " 95 %", transform=axes.get_yaxis_transform(), va="center", fontsize=7)
         axes.plot(x, root, color=MODEL, marker="o", markersize=3)
+        axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.set_ylim(-0.1, max(1.6 * limit, min(float(root.max()) * 1.05, 3.0 * limit)))
         unit = "" if profile["unit"] in (None, "", "1") else f" ({label(profile['unit'], 20)})"
         axes.set_xlabel(f"{label(profile['parameter'], 40)}{unit}")

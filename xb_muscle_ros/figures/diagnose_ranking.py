@@ -57,7 +57,7 @@ def draw_ranking(facts: Mapping[str, Any]) -> list[str]:
         axes[0].set_xlabel("RMSD on trials left out (% F$_0$)")
         if has_scores:
             axes[1].axvline(0.0, color=DATA, linewidth=0.7, linestyle=(0, (4, 2)), zorder=0)
-            axes[1].set_xlabel(f"Predictive score minus that of {reference(rows)}\n(Δ elpd ± s.e.; right is better)")
+            axes[1].set_xlabel("Δ elpd ± s.e. (right is better)")
         axes[0].set_yticks(range(len(rows)), [label(human(str(row["name"])), 44) for row in rows])
         for tick, row in zip(axes[0].get_yticklabels(), rows, strict=True):
             tick.set_fontweight("bold" if row["name"] in _answers(facts) else "normal")

@@ -13,6 +13,13 @@ from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
 _COLUMNS = 3
 _PER_PAGE = 9
+_HEAD_MM = 7.0
+_ROW_MM = 74.0
+_TITLE_MM = 4.5
+_HEIGHTS_MM = (8.0, 33.0, 15.0)
+_LEFT_MM = 18.5
+_GAP_MM = 10.0
+_PANEL_MM = (WIDTH_MM - _LEFT_MM - 1.5 - (_COLUMNS - 1) * _GAP_MM) / _COLUMNS
 _SHADE = "#dfe5ee"
 _DASHED = (0, (4, 1.6))
 
@@ -28,23 +35,36 @@ def draw_traces(facts: Mapping[str, Any], traces: Sequence[Trace]) -> list[str]:
     limit = _residual_limit(traces)
     drawn = []
     for chosen in pages(order, _PER_PAGE):
-        columns = min(_COLUMNS, len(chosen))
-        lines = -(-len(chosen) // columns)
-        with figure(WIDTH_MM, 12.0 + (72.0 if lines < 3 else 68.0) * lines) as made:
-            grid = made.add_gridspec(lines, columns)
+        lines = -(-len(chosen) // _COLUMNS)
+        height = _HEAD_MM + lines * _ROW_MM
+        with figure(WIDTH_MM, height) as made:
+            # Panels of the same size at fixed places: rows compare, and many trials draw fast.
+            made.set_layout_engine("none")
             handles: dict[str, Any] = {}
             for k, i in enumerate(chosen):
-                cell = grid[k // columns, k % columns].subgridspec(3, 1, height_ratios=(1, 3.4, 1.7), hspace=0.06)
-                top = made.add_subplot(cell[0])
-                axes = (top, made.add_subplot(cell[1], sharex=top), made.add_subplot(cell[2], sharex=top))
+                axes = _place(made, height, k // _COLUMNS, k % _COLUMNS)
                 _spans(axes, facts, rows[i]["trial"])
                 handles |= _panel(axes, traces[i])
-                top.set_title(trial_label(rows[i], 34), loc="left", fontsize=7)
+                axes[0].set_title(trial_label(rows[i], 34), loc="left", fontsize=7, pad=3)
                 axes[2].set_ylim(-limit, limit)
-                _labels(axes, first=k % columns == 0, last=k + columns >= len(chosen))
-            made.legend(handles=list(handles.values()), loc="outside upper center", ncols=4, frameon=False)
+                _labels(axes, first=k % _COLUMNS == 0, last=k + _COLUMNS >= len(chosen))
+            made.legend(
+                handles=list(handles.values()), loc="upper center", ncols=4, frameon=False, bbox_to_anchor=(0.5, 1.0)
+            )
             drawn.append(svg(made))
     return drawn
+
+
+def _place(made: Any, height_mm: float, line: int, column: int) -> tuple[Any, Any, Any]:
+    """Axes of one trial: length, force, residual."""
+    left = (_LEFT_MM + column * (_PANEL_MM + _GAP_MM)) / WIDTH_MM
+    top_mm = _HEAD_MM + line * _ROW_MM + _TITLE_MM
+    made_axes: list[Any] = []
+    for tall in _HEIGHTS_MM:
+        box = (left, 1.0 - (top_mm + tall) / height_mm, _PANEL_MM / WIDTH_MM, tall / height_mm)
+        made_axes.append(made.add_axes(box, sharex=made_axes[0] if made_axes else None))
+        top_mm += tall + 2.2
+    return made_axes[0], made_axes[1], made_axes[2]
 
 
 def _panel(axes: tuple[Any, Any, Any], trace: Trace) -> dict[str, Any]:
@@ -102,10 +122,14 @@ def _labels(axes: tuple[Any, Any, Any], first: bool, last: bool) -> None:
     for axis, most in ((top, 2), (middle, 5), (bottom, 4)):
         axis.yaxis.set_major_locator(MaxNLocator(most))
     bottom.xaxis.set_major_locator(MaxNLocator(5))
+    for axis in axes:
+        axis.tick_params(length=2.5, width=0.6, pad=2, labelsize=7)
     if first:
         top.set_ylabel("ΔL\n(% L$_0$)")
         middle.set_ylabel("Force (F$_0$)")
         bottom.set_ylabel("Residual\n(% F$_0$)")
+        for axis in axes:
+            axis.yaxis.set_label_coords(-9.8 / _PANEL_MM, 0.5)
     if last:
         bottom.set_xlabel("Time (s)")
 

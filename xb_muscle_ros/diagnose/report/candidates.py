@@ -38,7 +38,7 @@ def candidates(page: Markup, written: Written) -> str:
         "Everything that was looked at, best first; RMSD in % F<sub>0</sub>. Grey: left out after a first look, with "
         f"the reason. Δ elpd: predictive score minus that of {against}, with its standard error."
     )
-    head = ["Explanation", "Kind", "Parameters [95 %]", "RMSD fitted", "left out", "Δ elpd ± s.e."]
+    head = ["Explanation", "Kind", "Parameters [95 %]", "RMSD, fitted", "RMSD, left out", "Δ elpd ± s.e."]
     return figure + page.table(caption, head, [_row(page, facts, row) for row in facts["candidates"]], words=3)
 
 
@@ -83,7 +83,7 @@ def _score(row: Facts) -> str | None:
     if row["delta_elpd"] is None:
         return None
     text = digits(row["delta_elpd"], 2).replace("-", "−")
-    return text if row["se"] is None else f"{text} ± {digits(row['se'], 2)}"
+    return text if not row["se"] else f"{text} ± {digits(row['se'], 2)}"
 
 
 def _percent(value_f0: float | None) -> str | None:

@@ -32,9 +32,8 @@ nav a { margin-right: .9em; white-space: nowrap; }
   background: var(--tint); break-inside: avoid; }
 .kicker { margin: 0; font-size: .72rem; letter-spacing: .08em; text-transform: uppercase; color: var(--soft); }
 .verdict h2 { margin: .1rem 0 .3rem; padding: 0; border: 0; font-size: 1.35rem; }
-.facts { display: flex; flex-wrap: wrap; gap: .6rem 1.8rem; margin: .9rem 0 .1rem; font-size: .8rem;
+.facts { display: flex; flex-wrap: wrap; gap: .6rem 1.4rem; margin: .9rem 0 .1rem; font-size: .8rem;
   color: var(--soft); }
-.facts div { min-width: 6rem; }
 .facts b { display: block; font-size: 1.05rem; font-weight: 600; color: var(--ink); }
 .list { margin: .3rem 0; padding: 0; list-style: none; font-size: .86rem; }
 .list li { padding: .22rem 0 .22rem 5.2rem; text-indent: -5.2rem; border-bottom: 1px solid #ececec;
@@ -62,20 +61,26 @@ tr.answer td:first-child { font-weight: 600; }
 tr.answer small { font-weight: 400; }
 tr.left-out td, tr.left-out small { color: #767676; }
 dl { font-size: .8rem; line-height: 1.42; }
-dl div { padding: .3rem .3rem; border-bottom: 1px solid #ececec; break-inside: avoid; }
+dl div { display: grid; grid-template-columns: 12rem 1fr; gap: 0 1rem; padding: .3rem; border-bottom: 1px solid #ececec;
+  break-inside: avoid; }
 dt { font-weight: 600; }
 dd { margin: 0; }
 footer { margin-top: 2.4rem; padding-top: .6rem; border-top: 1px solid var(--rule); font-size: .76rem;
   color: var(--soft); }
 @page { size: A4; margin: 15mm 16mm 16mm;
   @bottom-right { content: counter(page); font: 8pt sans-serif; color: #5d5d5d; } }
+@media (max-width: 36rem) { dl div { display: block; } table { font-size: .66rem; } }
 @media print {
   html { font-size: 10pt; }
   body { max-width: none; padding: 0; }
   nav { display: none; }
   a, a.n { color: inherit; border-bottom: 0; }
   .verdict, .next { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
-  h2 { margin-top: 1.6rem; }
+  h2 { margin-top: 1.3rem; }
+  .lead { margin: .8rem 0 1rem; font-size: 1.04rem; line-height: 1.45; }
+  .verdict { padding: .7rem 1rem .6rem; }
+  .next { padding-left: 1rem; }
+  h3 { margin-top: .8rem; }
   :target { background: none; }
 }
 """

@@ -87,14 +87,14 @@ def kernel(page: Markup, written: Written) -> str:
     words = []
     if found["time_constant_s"] is not None:
         number = page.number(f"{1e3 * found['time_constant_s']:.3g} ms", "kernel")
-        words.append(f"What is left follows the speed of length change and fades with a time constant of {number}.")
+        words.append(f"Memory of the speed of length change that describes it best: time constant {number}.")
     if found["scales_with"] in SCALES:
-        words.append(f"It scales with {SCALES[found['scales_with']]}.")
+        words.append(f"What is left {SCALES[found['scales_with']]}.")
     if found["gain"] is not None:
-        words.append(f"Its gain is {page.number(digits(found['gain'], 3), 'kernel')}.")
+        words.append(f"Gain: {page.number(digits(found['gain'], 3), 'kernel')}.")
     if found["explained"] is not None:
         share = page.number(f"{100.0 * found['explained']:.0f} %", "kernel")
-        words.append(f"This alone accounts for {share} of its mean square.")
+        words.append(f"This alone accounts for {share} of the mean square of what is left.")
     caption = (
         f"{page.number('Weights', 'kernel')} of exponential memories of the speed of length change that together "
         "describe what the base model leaves. Dashed: the time constant that sums them up."
@@ -110,8 +110,8 @@ def before_after(page: Markup, written: Written) -> str:
     figure = page.figure(
         draw_trials(facts),
         f"Force RMSD of every trial {page.number('fitted', 'rmsd')} and "
-        f"{page.number('left out of the fit', 'heldout_rmsd')}: base model (open), augmented model (filled, where there "
-        f"is one). Upright bar: {page.number('noise', 'noise')} of the trial. Dotted: what a "
+        f"{page.number('left out of the fit', 'heldout_rmsd')}: base model (open), augmented model (filled, where "
+        f"there is one). Upright bar: {page.number('noise', 'noise')} of the trial. Dotted: what a "
         f"{page.number('flexible curve', 'flexible_bound')} without physics reaches over all trials left out.",
         "Force error of every trial before and after",
     )
@@ -123,7 +123,7 @@ def before_after(page: Markup, written: Written) -> str:
         number = page.number(f"{percent(start)} % F0", "start_rmsd")
         given = f" With the values of the fibre file as it was given, the error over all trials is {number}."
     caption = f"Force RMSD of every trial in % F<sub>0</sub>, base model and augmented model.{given}"
-    head = ["Trial", "pCa", "Noise", "Fitted, base", "augmented", "Left out, base", "augmented"]
+    head = ["Trial", "pCa", "Noise", "Fitted: base", "augmented", "Left out: base", "augmented"]
     return figure + page.table(caption, head, rows)
 
 

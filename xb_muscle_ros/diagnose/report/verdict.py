@@ -53,8 +53,8 @@ def verdict_box(page: Markup, facts: Facts) -> str:
     told = [_MEANINGS[facts["verdict"]]] if facts["verdict"] in _MEANINGS else []
     named = [str(name) for name in facts["answer"]]
     told += [f"{human(name)[:1].upper()}{human(name)[1:]}: {meaning(name)}." for name in named if meaning(name)]
-    if facts["family"]:
-        told.append(f"Family: {family_words(str(facts['family']))}.")
+    if facts["family"] and told:
+        told[-1] += f" Family: {family_words(str(facts['family']))}."
     return (
         f'<section class="verdict" id="verdict"><p class="kicker">Verdict</p><h2>{prose(headline(facts))}</h2>'
         + "".join(f"<p>{prose(text)}</p>" for text in told)
@@ -89,10 +89,10 @@ def _facts(page: Markup, facts: Facts) -> str:
         cells.append((f"{text} % F<sub>0</sub>", f"error, trials {words}"))
     if facts["flexible_bound_rmsd_f0"] is not None:
         bound = page.number(percent(facts["flexible_bound_rmsd_f0"]), "flexible_bound")
-        cells.append((f"{bound} % F<sub>0</sub>", "flexible curve, trials left out"))
+        cells.append((f"{bound} % F<sub>0</sub>", "flexible curve, left out"))
     if facts["p_value"] is not None:
         words = chance(facts["p_value"]).removeprefix("in ")
-        cells.append((page.number(f"p = {facts['p_value']:.3g}", "p_value"), f"chance alone: {words}"))
+        cells.append((page.number(f"p = {facts['p_value']:.3g}", "p_value"), f"by chance: {words}"))
     return f'<div class="facts">{"".join(f"<div><b>{a}</b>{b}</div>" for a, b in cells)}</div>' if cells else ""
 
 
