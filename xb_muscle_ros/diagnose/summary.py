@@ -27,7 +27,10 @@ _MOST_CHANGES = 3
 # Parameters that moved less than this share are not worth a word.
 _CHANGED = 0.02
 # Below this share of the mean square a law describes nothing.
-_LAW = 0.2
+LAW = 0.2
+# Where the mean is less than this share of the root mean square, a residual goes both ways.
+ONE_WAY = 0.5
+_PULLS = {1: "harder than the model", -1: "less than the model", 0: "now harder, now less than the model"}
 
 
 class Piece(NamedTuple):
@@ -47,7 +50,7 @@ class Located(NamedTuple):
 
     Attributes:
         phase: its name.
-        sign: 1 where the fibre pulls harder than the model, -1 where less.
+        sign: 1 where the fibre pulls harder than the model, -1 where less, 0 where both.
         size_f0: largest there.
         rows: mismatches of the same phase and sign.
         others: further phases, in order of size.
@@ -100,9 +103,19 @@ def located(facts: Facts) -> Located | None:
     if not rows:
         return None
     first = max(rows, key=lambda row: float(row["size_f0"]))
-    same = tuple(row for row in rows if row["phase"] == first["phase"] and row["sign"] == first["sign"])
+    sign = direction(first)
+    same = tuple(row for row in rows if row["phase"] == first["phase"] and direction(row) == sign)
     others = tuple(dict.fromkeys(str(row["phase"]) for row in rows if row["phase"] != first["phase"]))
-    return Located(str(first["phase"]), int(first["sign"] or 0), float(first["size_f0"]), same, others)
+    return Located(str(first["phase"]), sign, float(first["size_f0"]), same, others)
+
+
+def direction(row: Facts) -> int:
+    """1 where the fibre pulls harder than the model, -1 where less, 0 where it changes within the span."""
+    size, mean = row["size_f0"], row["mean_f0"]
+    if size is not None and mean is not None and abs(mean) < ONE_WAY * size:
+        return 0
+    sign = row["sign"] or 0
+    return (sign > 0) - (sign < 0)
 
 
 def _none(facts: Facts) -> list[Sentence]:
@@ -185,11 +198,10 @@ def _ambiguous(facts: Facts) -> list[Sentence]:
 def _unexplained(facts: Facts) -> list[Sentence]:
     tried = sum(1 for row in facts["candidates"] if row["name"] != "base")
     out = _differs(facts)
-    out.append(
-        [Piece("None of the "), Piece(f"{tried}", "candidates"), Piece(" explanations tried removes it.")]
-        if tried
-        else [Piece("No explanation removes it.")]
-    )
+    if tried > 1:
+        out.append([Piece("None of the "), Piece(f"{tried}", "candidates"), Piece(" explanations tried removes it.")])
+    else:
+        out.append([Piece("The only explanation tried does not remove it." if tried else "No explanation removes it.")])
     out += _law(facts)
     bound = facts["flexible_bound_rmsd_f0"]
     if bound is not None:
@@ -242,7 +254,7 @@ def _noise(facts: Facts) -> Sentence:
     levels = sorted(float(row["noise_sd_f0"]) for row in facts["trials"] if row["noise_sd_f0"] is not None)
     if not levels:
         return []
-    return [Piece("; the noise of the recordings is "), Piece(f"{percent(levels[len(levels) // 2])} % F0", "noise")]
+    return [Piece(". The noise of the recordings is "), Piece(f"{percent(levels[len(levels) // 2])} % F0", "noise")]
 
 
 def _differs(facts: Facts) -> list[Sentence]:
@@ -261,13 +273,12 @@ def _differs(facts: Facts) -> list[Sentence]:
     where = located(facts)
     if where is None:
         return out
-    pulls = {1: "harder than", -1: "less than"}.get(where.sign, "otherwise than")
     out.append([
-        Piece(f"The difference is largest in the {phase_words(where.phase)} {_conditions(facts, where)}: "
-              f"there the fibre pulls {pulls} the model, by up to "),
+        Piece(f"The difference is largest in the {phase_words(where.phase)} {_conditions(facts, where)}. "
+              f"There the fibre pulls {_PULLS.get(where.sign, _PULLS[0])}, by up to "),
         Piece(f"{percent(where.size_f0)} % F0", "mismatch"),
         Piece("." if not where.others else
-              f"; smaller differences lie in the {joined([phase_words(p) for p in where.others[:2]])}."),
+              f". Smaller differences lie in the {joined([phase_words(p) for p in where.others[:2]])}."),
     ])  # fmt: skip
     return out
 
@@ -323,7 +334,7 @@ def _gain(facts: Facts, when: str) -> list[Sentence]:
     bound = facts["flexible_bound_rmsd_f0"]
     if bound is not None and how == "heldout_rmsd":
         out += [
-            Piece("; a flexible curve without any physics gets to "),
+            Piece(". A flexible curve without any physics gets to "),
             Piece(f"{percent(bound)} % F0", "flexible_bound"),
         ]
     return [[*out, Piece(".")]]
@@ -377,7 +388,7 @@ def _law(facts: Facts) -> list[Sentence]:
     if kernel is None or kernel["time_constant_s"] is None:
         return []
     share = kernel["explained"]
-    if share is not None and share < _LAW:
+    if share is not None and share < LAW:
         return [[
             Piece("It follows no simple memory of the speed of length change: that accounts for "),
             Piece(f"{100.0 * share:.0f} %", "kernel"),

@@ -55,11 +55,8 @@ def thinned(time: Array, values: Array) -> tuple[Array, Array]:
 
 
 def pages(places: list[int], most: int) -> list[list[int]]:
-    """Places in pages of about equal length, at most so many on each."""
-    if not places:
-        return []
-    count = -(-len(places) // most)
-    return [list(map(int, part)) for part in np.array_split(np.array(places), count)]
+    """Places in pages of so many; only the last may have fewer."""
+    return [places[first : first + most] for first in range(0, len(places), most)]
 
 
 def svg(made: Any) -> str:
@@ -71,4 +68,6 @@ def svg(made: Any) -> str:
         # Names may be in any script; the page beside the figure spells them in the reader's fonts.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         made.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
-    return text.getvalue()
+    drawn = text.getvalue()
+    # Without the document type, which names a file elsewhere.
+    return drawn[drawn.index("<svg") :]

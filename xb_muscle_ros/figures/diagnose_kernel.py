@@ -11,11 +11,12 @@ from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
 def draw_kernel(facts: Mapping[str, Any]) -> list[str]:
     """Weights of the exponentials against their time constants, as SVG; none where no kernel was found."""
-    kernel = facts["kernel"]
-    if kernel is None or not kernel["tau_s"] or not kernel["weight_f0"]:
+    kernel = facts["kernel"] or {}
+    pairs = zip(kernel.get("tau_s") or (), kernel.get("weight_f0") or (), strict=False)
+    known = [(1e3 * t, 100.0 * w) for t, w in pairs if t is not None and w is not None]
+    if not known:
         return []
-    tau = [1e3 * float(t) for t in kernel["tau_s"]]
-    weight = [100.0 * float(w or 0.0) for w in kernel["weight_f0"]]
+    tau, weight = map(list, zip(*known, strict=True))
     with figure(120.0, 56.0) as made:
         axes = made.add_subplot()
         axes.axhline(0.0, color="black", linewidth=0.5)

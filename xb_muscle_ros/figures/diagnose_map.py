@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.diagnose.summary import ONE_WAY
 from xb_muscle_ros.diagnose.words import percent, phase_words
 from xb_muscle_ros.figures.diagnose_common import WIDTH_MM, Array, by_activation, label, pages, svg, trial_label
 from xb_muscle_ros.figures.style import figure
@@ -22,7 +23,10 @@ def draw_map(facts: Mapping[str, Any]) -> list[str]:
     Colour and upper number are the mean residual of the cell, the lower number its root mean square, both in % F0. A
     heavy frame marks cells that differ from zero by more than chance (family-wise p < 0.05).
     """
-    maps = [facts[name] for name in ("map", "map_after") if facts[name] is not None]
+    maps = [facts["map"], facts["map_after"]]
+    if maps[1] is not None and maps[0] is not None and maps[1]["rms_f0"] == maps[0]["rms_f0"]:
+        maps.pop()
+    maps = [table for table in maps if table is not None]
     first = maps[0] if maps else None
     if first is None or not first["trials"] or not first["phases"]:
         return []
@@ -32,7 +36,7 @@ def draw_map(facts: Mapping[str, Any]) -> list[str]:
     drawn = []
     for chosen in pages(by_activation(rows), _PER_PAGE):
         names = [rows[i]["trial"] for i in chosen]
-        with figure(WIDTH_MM, 33.0 + 6.8 * len(chosen)) as made:
+        with figure(WIDTH_MM if len(maps) > 1 else 0.66 * WIDTH_MM, 33.0 + 6.8 * len(chosen)) as made:
             axes = made.subplots(1, len(maps), squeeze=False, sharey=True)[0]
             image = None
             for axis, table, title in zip(axes, maps, ("base model", "augmented model"), strict=False):
@@ -67,7 +71,11 @@ def _cells(axis: Any, table: Mapping[str, Any], names: list[str], limit: float) 
         _array(table[key], *shape)[take] * factor
         for key, factor in (("mean_f0", 100.0), ("rms_f0", 100.0), ("p_value", 1.0))
     )
-    image = axis.imshow(mean, cmap=_colours(), vmin=-limit, vmax=limit, aspect="auto")
+    edges = [np.arange(n + 1) - 0.5 for n in mean.shape]
+    image = axis.pcolormesh(
+        edges[1], edges[0], mean, cmap=_colours(), vmin=-limit, vmax=limit, edgecolors="white", linewidth=0.6
+    )
+    axis.set_ylim(mean.shape[0] - 0.5, -0.5)
     for i, j in np.ndindex(mean.shape):
         box = (j - 0.5, i - 0.5)
         if not np.isfinite(mean[i, j]) and not np.isfinite(rms[i, j]):
@@ -79,7 +87,11 @@ def _cells(axis: Any, table: Mapping[str, Any], names: list[str], limit: float) 
         if np.isfinite(mean[i, j]):
             axis.text(j, i - 0.16, _signed(mean[i, j], limit), ha="center", va="center", fontsize=6.5, color=colour)
         if np.isfinite(rms[i, j]):
-            axis.text(j, i + 0.26, percent(rms[i, j] / 100.0), ha="center", va="center", fontsize=4.8, color=colour)
+            both = abs(mean[i, j]) < ONE_WAY * rms[i, j] and p_value[i, j] < _SIGNIFICANT
+            axis.text(
+                j, i + 0.26, ("±" if both else "") + percent(rms[i, j] / 100.0), ha="center", va="center", color=colour,
+                fontsize=5.4 if both else 4.8, fontweight="bold" if both else "normal",
+            )  # fmt: skip
         if p_value[i, j] < _SIGNIFICANT:
             inner = (box[0] + 0.03, box[1] + 0.06)
             axis.add_patch(Rectangle(inner, 0.94, 0.88, fill=False, edgecolor="black", linewidth=1.3))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.diagnose.summary import direction
 from xb_muscle_ros.diagnose.written import Trace
 from xb_muscle_ros.figures.diagnose_common import WIDTH_MM, Array, by_activation, pages, svg, thinned, trial_label
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
@@ -105,12 +106,11 @@ def _spans(axes: Sequence[Any], facts: Mapping[str, Any], trial: str) -> None:
             continue
         for axis in axes:
             axis.axvspan(row["start_s"], row["end_s"], color=_SHADE, linewidth=0)
-        mark = {1: "+", -1: "−"}.get(int(row["sign"] or 0))
-        if mark:
-            axes[2].text(
-                (row["start_s"] + row["end_s"]) / 2.0, 0.99, mark, transform=axes[2].get_xaxis_transform(),
-                ha="center", va="top", fontsize=8, fontweight="bold", clip_on=True,
-            )  # fmt: skip
+        mark = {1: "+", -1: "−", 0: "±"}[direction(row)]
+        axes[2].text(
+            (row["start_s"] + row["end_s"]) / 2.0, 0.99, mark, transform=axes[2].get_xaxis_transform(),
+            ha="center", va="top", fontsize=8, fontweight="bold", clip_on=True,
+        )  # fmt: skip
 
 
 def _labels(axes: tuple[Any, Any, Any], first: bool, last: bool) -> None:

@@ -47,7 +47,7 @@ def _row(page: Markup, facts: Facts, row: Facts) -> tuple[str, list[str]]:
     told = prose(human(name))
     if meaning(name):
         told += f"<small>{prose(meaning(name))}</small>"
-    if row["note"]:
+    if row["note"] and row["parameters"]:
         told += f"<small>{prose(row['note'])}</small>"
     answers = {*map(str, facts["answer"]), "+".join(map(str, facts["answer"]))}
     cut = row["heldout_rmsd_f0"] is None and row["delta_elpd"] is None and name != "base"
@@ -76,7 +76,7 @@ def _parameters(page: Markup, row: Facts) -> str:
             low, high = (digits(float(end), 3) for end in interval)
             text += f" [{page.number(f'{low}, {high}', 'interval')}]"
         out.append(text)
-    return "<br>".join(out) or NOTHING
+    return "<br>".join(out) or prose(row["note"] or NOTHING)
 
 
 def _score(row: Facts) -> str | None:

@@ -49,7 +49,8 @@ table { width: 100%; margin: 1.1rem 0 1.5rem; border-collapse: collapse; font-si
   font-variant-numeric: tabular-nums; }
 caption { padding-bottom: .4rem; text-align: left; font-size: .78rem; line-height: 1.42; color: #333;
   break-after: avoid; }
-thead { display: table-header-group; }
+thead { display: table-header-group; break-after: avoid; }
+tbody tr:first-child { break-before: avoid; }
 th, td { padding: .26rem .5rem .26rem 0; vertical-align: top; text-align: left; }
 th { border-top: 1px solid var(--ink); border-bottom: 1px solid var(--ink); font-weight: 600; vertical-align: bottom; }
 tr { break-inside: avoid; }

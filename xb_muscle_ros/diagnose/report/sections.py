@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from xb_muscle_ros.diagnose.report.markup import NOTHING, Markup, escaped, prose
+from xb_muscle_ros.diagnose.summary import LAW
 from xb_muscle_ros.diagnose.words import SCALES, digits, human, percent, phase_words, quantity
 from xb_muscle_ros.diagnose.written import Written
 from xb_muscle_ros.figures.diagnose_common import by_activation
@@ -17,13 +18,13 @@ from xb_muscle_ros.figures.diagnose_trials import draw_trials
 
 Facts = Mapping[str, Any]
 
-_MOST_ROWS = 40
+_MOST_ROWS = 20
 
 
 def where(page: Markup, written: Written) -> str:
     """Mismatches located, and the map before and after."""
     facts = written.facts
-    out = []
+    out = [_map(page, facts)]
     if not facts["mismatch"]:
         out.append("<p>No place stands out beyond chance.</p>")
     else:
@@ -37,23 +38,25 @@ def where(page: Markup, written: Written) -> str:
         )
         head = ["Phase", "Trial", "pCa", "From–to (s)", "Size (% F<sub>0</sub>)", "Mean (% F<sub>0</sub>)", "p"]
         out.append(page.table(caption, head, rows, words=2))
-    out.append(
-        page.figure(
-            draw_map(facts),
-            "Measured minus modelled force in each phase of each trial, from low to high calcium, in % F<sub>0</sub>. "
-            f"Upper number and colour: {page.number('mean', 'map')} (orange, +: the fibre pulls harder than the model; "
-            f"violet, −: less). Small number: {page.number('root mean square', 'map')}. Heavy frame: beyond chance "
-            f"({page.number('p < 0.05', 'cell_p_value')}, all cells together). Hatched: the trial has no such phase.",
-            "Heat map of the residual over trials and phases",
-        )
-    )
     return "\n".join(out)
+
+
+def _map(page: Markup, facts: Facts) -> str:
+    return page.figure(
+        draw_map(facts),
+        "Measured minus modelled force in each phase of each trial, from low to high calcium, in % F<sub>0</sub>. "
+        f"Upper number and colour: {page.number('mean', 'map')} (orange, +: the fibre pulls harder than the model; "
+        f"violet, −: less). Small number: {page.number('root mean square', 'map')}, bold with ± where it is more than "
+        "twice the mean: there the difference goes both ways. Heavy frame: beyond chance "
+        f"({page.number('p < 0.05', 'cell_p_value')}, all cells together). Hatched: the trial has no such phase.",
+        "Heat map of the residual over trials and phases",
+    )
 
 
 def _mismatch(page: Markup, row: Facts, pca_of: Mapping[str, Any]) -> list[str]:
     pca, start, end = pca_of.get(row["trial"]), row["start_s"], row["end_s"]
     span = NOTHING if start is None or end is None else page.number(f"{start:.3f}–{end:.3f}", "mismatch")
-    sign = {1: "+", -1: "−"}.get(int(row["sign"] or 0), "")
+    sign = "" if not row["mean_f0"] else "+" if row["mean_f0"] > 0.0 else "−"
     mean = None if row["mean_f0"] is None else sign + percent(abs(row["mean_f0"]))
     return [
         NOTHING if row["phase"] is None else prose(phase_words(str(row["phase"]))),
@@ -74,7 +77,7 @@ def traces(page: Markup, written: Written) -> str:
         "Length (top), force measured (grey) and modelled (middle), and what is left, measured minus modelled force "
         f"({residual}, bottom; same scale in all trials), from low to high calcium. Dashed orange: base model with its "
         "parameters and corrections fitted. Blue: augmented model, where there is one. Shaded: located mismatch of the "
-        "base model, + where the fibre pulls harder than the model, − where less.",
+        "base model, + where the fibre pulls harder than the model, − where less, ± where both.",
         "Measured and modelled force of every trial",
     )
 
@@ -82,8 +85,12 @@ def traces(page: Markup, written: Written) -> str:
 def kernel(page: Markup, written: Written) -> str:
     """The law that what is left follows, if any."""
     found = written.facts["kernel"]
-    if found is None:
-        return "<p>What is left of the force follows no simple memory of the speed of length change.</p>"
+    share = None if found is None else found["explained"]
+    if found is None or (share is not None and share < LAW):
+        number = (
+            "" if share is None else f": the best accounts for {page.number(f'{100.0 * share:.0f} %', 'kernel')} of it"
+        )
+        return f"<p>What the base model leaves follows no simple memory of the speed of length change{number}.</p>"
     words = []
     if found["time_constant_s"] is not None:
         number = page.number(f"{1e3 * found['time_constant_s']:.3g} ms", "kernel")
