@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from xb_muscle_ros.diagnose.names import FAMILY, Name, Verdict
-from xb_muscle_ros.diagnose.summary import located, summary_pieces, summary_text, together
+from xb_muscle_ros.diagnose.sentences import located, together
+from xb_muscle_ros.diagnose.summary import summary_pieces, summary_text
 from xb_muscle_ros.diagnose.words import chance, digits, family_words, human, likely, meaning, percent
 from xb_muscle_ros.diagnose.written import filled
 

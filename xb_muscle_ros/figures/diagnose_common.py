@@ -6,7 +6,7 @@ import io
 import itertools
 import re
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,17 @@ def trial_label(row: Any, most: int) -> str:
     """Name of a trial and its pCa."""
     pca = "" if row["pca"] is None else f"  pCa {row['pca']:g}"
     return label(row["trial"], most - len(pca)) + pca
+
+
+def augmented(facts: Mapping[str, Any]) -> bool:
+    """Whether there is another model than the base to show."""
+    pairs = (("before_rmsd_f0", "after_rmsd_f0"), ("heldout_before_f0", "heldout_after_f0"))
+    return any(row[b] != row[a] and row[a] is not None for row in facts["trials"] for b, a in pairs)
+
+
+def after_name(facts: Mapping[str, Any]) -> str:
+    """What that other model is called: one with a fault of the measurement in it has no new physics."""
+    return "corrected model" if facts["verdict"] == "measurement" else "augmented model"
 
 
 def by_activation(rows: Iterable[Any]) -> list[int]:

@@ -7,14 +7,25 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.diagnose.summary import ONE_WAY
+from xb_muscle_ros.diagnose.sentences import ONE_WAY
 from xb_muscle_ros.diagnose.words import percent, phase_words
-from xb_muscle_ros.figures.diagnose_common import WIDTH_MM, Array, by_activation, label, pages, svg, trial_label
+from xb_muscle_ros.figures.diagnose_common import (
+    WIDTH_MM,
+    Array,
+    after_name,
+    by_activation,
+    label,
+    pages,
+    svg,
+    trial_label,
+)
 from xb_muscle_ros.figures.style import figure
 
 _PER_PAGE = 24
 _SIGNIFICANT = 0.05
 _DARK = 0.75
+# Smaller differences matter to nobody, so they do not get the strongest colours (% F0).
+_FLOOR = 0.3
 
 
 def draw_map(facts: Mapping[str, Any]) -> list[str]:
@@ -32,14 +43,14 @@ def draw_map(facts: Mapping[str, Any]) -> list[str]:
         return []
     pca_of = {row["trial"]: row["pca"] for row in facts["trials"]}
     rows = [{"trial": name, "pca": pca_of.get(name)} for name in first["trials"]]
-    limit = max([0.1, *(float(np.nanmax(np.abs(m))) for m in map(_means, maps) if np.any(np.isfinite(m)))])
+    limit = max([_FLOOR, *(float(np.nanmax(np.abs(m))) for m in map(_means, maps) if np.any(np.isfinite(m)))])
     drawn = []
     for chosen in pages(by_activation(rows), _PER_PAGE):
         names = [rows[i]["trial"] for i in chosen]
         with figure(WIDTH_MM if len(maps) > 1 else 0.66 * WIDTH_MM, 33.0 + 6.8 * len(chosen)) as made:
             axes = made.subplots(1, len(maps), squeeze=False, sharey=True)[0]
             image = None
-            for axis, table, title in zip(axes, maps, ("base model", "augmented model"), strict=False):
+            for axis, table, title in zip(axes, maps, ("base model", after_name(facts)), strict=False):
                 image = _cells(axis, table, names, limit)
                 axis.set_title(title, loc="left")
             axes[0].set_yticks(range(len(chosen)), [trial_label(rows[i], 30) for i in chosen], fontsize=6.5)

@@ -53,7 +53,7 @@ def draw_ranking(facts: Mapping[str, Any]) -> list[str]:
         base = next((r["heldout_rmsd_f0"] for r in rows if r["name"] == "base"), None)
         if base is not None:
             axes[0].axvline(100.0 * base, color=DATA, linewidth=0.7, linestyle=(0, (4, 2)), zorder=0)
-        axes[0].set_xlim(left=0.0)
+        axes[0].set_xlim(0.0, 1.06 * axes[0].get_xlim()[1])
         axes[0].set_xlabel("RMSD on trials left out (% F$_0$)")
         if has_scores:
             axes[1].axvline(0.0, color=DATA, linewidth=0.7, linestyle=(0, (4, 2)), zorder=0)

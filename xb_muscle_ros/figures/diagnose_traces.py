@@ -7,9 +7,18 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.diagnose.summary import direction
+from xb_muscle_ros.diagnose.sentences import direction
 from xb_muscle_ros.diagnose.written import Trace
-from xb_muscle_ros.figures.diagnose_common import WIDTH_MM, Array, by_activation, pages, svg, thinned, trial_label
+from xb_muscle_ros.figures.diagnose_common import (
+    WIDTH_MM,
+    Array,
+    after_name,
+    by_activation,
+    pages,
+    svg,
+    thinned,
+    trial_label,
+)
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
 _COLUMNS = 3
@@ -45,7 +54,7 @@ def draw_traces(facts: Mapping[str, Any], traces: Sequence[Trace]) -> list[str]:
             for k, i in enumerate(chosen):
                 axes = _place(made, height, k // _COLUMNS, k % _COLUMNS)
                 _spans(axes, facts, rows[i]["trial"])
-                handles |= _panel(axes, traces[i])
+                handles |= _panel(axes, traces[i], after_name(facts))
                 axes[0].set_title(trial_label(rows[i], 34), loc="left", fontsize=7, pad=3)
                 axes[2].set_ylim(-limit, limit)
                 _labels(axes, first=k % _COLUMNS == 0, last=k + _COLUMNS >= len(chosen))
@@ -68,7 +77,7 @@ def _place(made: Any, height_mm: float, line: int, column: int) -> tuple[Any, An
     return made_axes[0], made_axes[1], made_axes[2]
 
 
-def _panel(axes: tuple[Any, Any, Any], trace: Trace) -> dict[str, Any]:
+def _panel(axes: tuple[Any, Any, Any], trace: Trace, after: str) -> dict[str, Any]:
     top, middle, bottom = axes
     handles: dict[str, Any] = {}
     if trace.length_l0 is not None:
@@ -78,7 +87,7 @@ def _panel(axes: tuple[Any, Any, Any], trace: Trace) -> dict[str, Any]:
             *thinned(trace.time_s, trace.measured_f0), color=DATA, linewidth=2.8, label="measured"
         )
     bottom.axhline(0.0, color="black", linewidth=0.5)
-    for name, values, colour, style, width in _models(trace):
+    for name, values, colour, style, width in _models(trace, after):
         (handles[name],) = middle.plot(
             *thinned(trace.time_s, values), color=colour, linestyle=style, linewidth=width, label=name
         )
@@ -89,14 +98,14 @@ def _panel(axes: tuple[Any, Any, Any], trace: Trace) -> dict[str, Any]:
     return handles
 
 
-def _models(trace: Trace) -> list[tuple[str, Array, str, Any, float]]:
+def _models(trace: Trace, after_is: str = "augmented model") -> list[tuple[str, Array, str, Any, float]]:
     """The base model, and the augmented one where it is another."""
     found: list[tuple[str, Array, str, Any, float]] = []
     before, after = trace.before_f0, trace.after_f0
     if before is not None:
         found.append(("base model", before, SECOND, _DASHED, 1.0))
     if after is not None and (before is None or not np.array_equal(before, after, equal_nan=True)):
-        found.append(("augmented model", after, MODEL, "-", 1.0))
+        found.append((after_is, after, MODEL, "-", 1.0))
     return found
 
 
@@ -143,4 +152,4 @@ def _residual_limit(traces: Sequence[Trace]) -> float:
         for _, values, *_ in _models(trace)
         if np.any(np.isfinite(trace.measured_f0 - values))
     ]
-    return 1.2 * max([*sizes, 0.1])
+    return 1.2 * max([*sizes, 0.3])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from xb_muscle_ros.diagnose.report.markup import NOTHING, Markup, escaped, prose
+from xb_muscle_ros.diagnose.report.markup import NOTHING, Markup, escaped, named, prose
 from xb_muscle_ros.diagnose.words import digits, family_words, human, meaning, percent
 from xb_muscle_ros.diagnose.written import Written
 from xb_muscle_ros.figures.diagnose_ranking import compared, draw_ranking, kind_of, reference
@@ -44,7 +44,7 @@ def candidates(page: Markup, written: Written) -> str:
 
 def _row(page: Markup, facts: Facts, row: Facts) -> tuple[str, list[str]]:
     name = str(row["name"])
-    told = prose(human(name))
+    told = f'<span class="any">{prose(human(name))}</span>'
     if meaning(name):
         told += f"<small>{prose(meaning(name))}</small>"
     if row["note"] and row["parameters"]:
@@ -70,7 +70,7 @@ def _parameters(page: Markup, row: Facts) -> str:
     for name, value in row["parameters"].items():
         if value is None:
             continue
-        text = f"{escaped(name)} = {page.number(digits(float(value), 3), 'parameters')}"
+        text = f"{named(name)} = {page.number(digits(float(value), 3), 'parameters')}"
         interval = row["interval"].get(name)
         if interval and None not in interval:
             low, high = (digits(float(end), 3) for end in interval)

@@ -15,6 +15,7 @@ header p { margin: 0; font-size: .8rem; color: var(--soft); }
 h1 { margin: .15rem 0 .3rem; font-size: 1.9rem; line-height: 1.2; font-weight: 600; }
 h2 { margin: 2.6rem 0 .6rem; padding-top: .5rem; border-top: 1px solid var(--rule); font-size: 1.2rem; line-height: 1.3;
   font-weight: 600; break-after: avoid; }
+h2 + p { break-after: avoid; }
 h3 { margin: 1.2rem 0 .3rem; font-size: 1rem; font-weight: 600; break-after: avoid; }
 p { margin: .5rem 0; }
 sub { font-size: .7em; line-height: 0; }
@@ -51,12 +52,13 @@ caption { padding-bottom: .4rem; text-align: left; font-size: .78rem; line-heigh
   break-after: avoid; }
 thead { display: table-header-group; break-after: avoid; }
 tbody tr:first-child { break-before: avoid; }
-th, td { padding: .26rem .5rem .26rem 0; vertical-align: top; text-align: left; }
+th, td { overflow-wrap: normal; padding: .26rem .5rem .26rem 0; vertical-align: top; text-align: left; }
 th { border-top: 1px solid var(--ink); border-bottom: 1px solid var(--ink); font-weight: 600; vertical-align: bottom; }
 tr { break-inside: avoid; }
 tbody tr { border-bottom: 1px solid #ececec; }
 tbody tr:last-child { border-bottom: 1px solid var(--ink); }
 th.r, td.r { padding: .26rem 0 .26rem .5rem; text-align: right; }
+.any { overflow-wrap: anywhere; }
 td small { display: block; color: var(--soft); font-size: .94em; }
 tr.answer td:first-child { font-weight: 600; }
 tr.answer small { font-weight: 400; }

@@ -23,6 +23,11 @@ def prose(text: object) -> str:
     return _UNITS.sub(r"\1<sub>0</sub>", escaped(text))
 
 
+def named(text: object) -> str:
+    """A name that came with the data, escaped; it may break anywhere, so that long ones leave room beside them."""
+    return f'<span class="any">{escaped(text)}</span>'
+
+
 class Markup:
     """Pieces of one page; remembers what was linked and counts figures and tables.
 

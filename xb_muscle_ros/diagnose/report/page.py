@@ -14,10 +14,10 @@ from xb_muscle_ros.diagnose.written import Written
 
 _PARTS: tuple[tuple[str, str, Callable[[Markup, Written], str]], ...] = (
     ("where", "Where the model differs", sections.where),
-    ("traces", "Every trial", sections.traces),
+    ("traces", "Measured and modelled force", sections.traces),
     ("memory", "What the difference follows", sections.kernel),
     ("explanations", "Explanations compared", candidates),
-    ("errors", "Before and after", sections.before_after),
+    ("errors", "Error of every trial", sections.before_after),
     ("parameter", "The new parameter", sections.profile),
     ("estimates", "Corrections and parameters", sections.estimates),
 )

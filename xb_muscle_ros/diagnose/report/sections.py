@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from xb_muscle_ros.diagnose.report.markup import NOTHING, Markup, escaped, prose
-from xb_muscle_ros.diagnose.summary import LAW
+from xb_muscle_ros.diagnose.report.markup import NOTHING, Markup, escaped, named, prose
+from xb_muscle_ros.diagnose.sentences import LAW
 from xb_muscle_ros.diagnose.words import SCALES, digits, human, percent, phase_words, quantity
 from xb_muscle_ros.diagnose.written import Written
-from xb_muscle_ros.figures.diagnose_common import by_activation
+from xb_muscle_ros.figures.diagnose_common import after_name, augmented, by_activation
 from xb_muscle_ros.figures.diagnose_kernel import draw_kernel
 from xb_muscle_ros.figures.diagnose_map import draw_map
 from xb_muscle_ros.figures.diagnose_profile import draw_profile
@@ -24,21 +24,18 @@ _MOST_ROWS = 20
 def where(page: Markup, written: Written) -> str:
     """Mismatches located, and the map before and after."""
     facts = written.facts
-    out = [_map(page, facts)]
     if not facts["mismatch"]:
-        out.append("<p>No place stands out beyond chance.</p>")
-    else:
-        pca_of = {row["trial"]: row["pca"] for row in facts["trials"]}
-        rows = [("", _mismatch(page, row, pca_of)) for row in facts["mismatch"][:_MOST_ROWS]]
-        more = len(facts["mismatch"]) - len(rows)
-        caption = (
-            "Where the base model, with its parameters and the usual corrections fitted, differs by more than chance; "
-            "largest first. Size is the root mean square there."
-            + (f" {more} smaller ones are in <code>diagnosis.json</code>." if more else "")
-        )
-        head = ["Phase", "Trial", "pCa", "From–to (s)", "Size (% F<sub>0</sub>)", "Mean (% F<sub>0</sub>)", "p"]
-        out.append(page.table(caption, head, rows, words=2))
-    return "\n".join(out)
+        return f"<p>No place stands out beyond chance.</p>\n{_map(page, facts)}"
+    pca_of = {row["trial"]: row["pca"] for row in facts["trials"]}
+    rows = [("", _mismatch(page, row, pca_of)) for row in facts["mismatch"][:_MOST_ROWS]]
+    more = len(facts["mismatch"]) - len(rows)
+    caption = (
+        "Where the base model, with its parameters and the usual corrections fitted, differs by more than chance; "
+        "largest first. Size is the root mean square there."
+        + (f" {more} smaller ones are in <code>diagnosis.json</code>." if more else "")
+    )
+    head = ["Phase", "Trial", "pCa", "From–to (s)", "Size (% F<sub>0</sub>)", "Mean (% F<sub>0</sub>)", "p"]
+    return f"{_map(page, facts)}\n{page.table(caption, head, rows, words=2)}"
 
 
 def _map(page: Markup, facts: Facts) -> str:
@@ -59,8 +56,8 @@ def _mismatch(page: Markup, row: Facts, pca_of: Mapping[str, Any]) -> list[str]:
     sign = "" if not row["mean_f0"] else "+" if row["mean_f0"] > 0.0 else "−"
     mean = None if row["mean_f0"] is None else sign + percent(abs(row["mean_f0"]))
     return [
-        NOTHING if row["phase"] is None else prose(phase_words(str(row["phase"]))),
-        escaped(row["trial"]),
+        NOTHING if row["phase"] is None else named(phase_words(str(row["phase"]))),
+        named(row["trial"]),
         NOTHING if pca is None else f"{pca:g}",
         span,
         page.cell(_percent(row["size_f0"]), "mismatch"),
@@ -76,8 +73,8 @@ def traces(page: Markup, written: Written) -> str:
         draw_traces(written.facts, written.traces),
         "Length (top), force measured (grey) and modelled (middle), and what is left, measured minus modelled force "
         f"({residual}, bottom; same scale in all trials), from low to high calcium. Dashed orange: base model with its "
-        "parameters and corrections fitted. Blue: augmented model, where there is one. Shaded: located mismatch of the "
-        "base model, + where the fibre pulls harder than the model, − where less, ± where both.",
+        f"parameters and corrections fitted. Blue: {after_name(written.facts)}, where there is one. Shaded: located "
+        "mismatch of the base model, + where the fibre pulls harder than the model, − where less, ± where both.",
         "Measured and modelled force of every trial",
     )
 
@@ -85,12 +82,14 @@ def traces(page: Markup, written: Written) -> str:
 def kernel(page: Markup, written: Written) -> str:
     """The law that what is left follows, if any."""
     found = written.facts["kernel"]
-    share = None if found is None else found["explained"]
-    if found is None or (share is not None and share < LAW):
-        number = (
-            "" if share is None else f": the best accounts for {page.number(f'{100.0 * share:.0f} %', 'kernel')} of it"
+    if found is None:
+        return "<p>No memory of the speed of length change was found in what the base model leaves.</p>"
+    share = None if found["explained"] is None else page.number(f"{100.0 * found['explained']:.0f} %", "kernel")
+    if share is not None and found["explained"] < LAW:
+        return (
+            "<p>What the base model leaves follows no simple memory of the speed of length change: the best accounts "
+            f"for {share} of its mean square.</p>"
         )
-        return f"<p>What the base model leaves follows no simple memory of the speed of length change{number}.</p>"
     words = []
     if found["time_constant_s"] is not None:
         number = page.number(f"{1e3 * found['time_constant_s']:.3g} ms", "kernel")
@@ -99,8 +98,7 @@ def kernel(page: Markup, written: Written) -> str:
         words.append(f"What is left {SCALES[found['scales_with']]}.")
     if found["gain"] is not None:
         words.append(f"Gain: {page.number(digits(found['gain'], 3), 'kernel')}.")
-    if found["explained"] is not None:
-        share = page.number(f"{100.0 * found['explained']:.0f} %", "kernel")
+    if share is not None:
         words.append(f"This alone accounts for {share} of the mean square of what is left.")
     caption = (
         f"{page.number('Weights', 'kernel')} of exponential memories of the speed of length change that together "
@@ -117,40 +115,56 @@ def before_after(page: Markup, written: Written) -> str:
     figure = page.figure(
         draw_trials(facts),
         f"Force RMSD of every trial {page.number('fitted', 'rmsd')} and "
-        f"{page.number('left out of the fit', 'heldout_rmsd')}: base model (open), augmented model (filled, where "
+        f"{page.number('left out of the fit', 'heldout_rmsd')}: base model (open), {after_name(facts)} (filled, where "
         f"there is one). Upright bar: {page.number('noise', 'noise')} of the trial. Dotted: what a "
         f"{page.number('flexible curve', 'flexible_bound')} without physics reaches over all trials left out.",
         "Force error of every trial before and after",
     )
-    rows = [("answer", _totals(page, facts))]
-    rows += [("", _trial(page, facts["trials"][i])) for i in by_activation(facts["trials"])]
+    two = augmented(facts)
+    rows = [("answer", ["All trials", "", "", *_errors(page, _overall(facts), two)])]
+    rows += [("", _trial(page, facts["trials"][i], two)) for i in by_activation(facts["trials"])]
     start = facts["start"]["train_rmsd_f0"]
     given = ""
     if start is not None:
         number = page.number(f"{percent(start)} % F0", "start_rmsd")
         given = f" With the values of the fibre file as it was given, the error over all trials is {number}."
-    caption = f"Force RMSD of every trial in % F<sub>0</sub>, base model and augmented model.{given}"
-    head = ["Trial", "pCa", "Noise", "Fitted: base", "augmented", "Left out: base", "augmented"]
-    return figure + page.table(caption, head, rows)
+    name = after_name(facts)
+    which = f"base model and {name}" if two else "base model"
+    caption = f"Force RMSD of every trial in % F<sub>0</sub>, {which}.{given}"
+    short = name.removesuffix(" model")
+    columns = ["Fitted: base", short, "Left out: base", short] if two else ["Fitted", "Left out"]
+    return figure + page.table(caption, ["Trial", "pCa", "Noise", *columns], rows)
 
 
-def _totals(page: Markup, facts: Facts) -> list[str]:
+def _overall(facts: Facts) -> Facts:
+    """Errors over all trials under the keys of a trial."""
     before, after = facts["before"], facts["after"]
-    cells = [page.cell(_percent(g["train_rmsd_f0"]), "rmsd") for g in (before, after)]
-    cells += [page.cell(_percent(g["heldout_rmsd_f0"]), "heldout_rmsd") for g in (before, after)]
-    return ["All trials", "", "", *cells]
+    return {
+        "before_rmsd_f0": before["train_rmsd_f0"],
+        "after_rmsd_f0": after["train_rmsd_f0"],
+        "heldout_before_f0": before["heldout_rmsd_f0"],
+        "heldout_after_f0": after["heldout_rmsd_f0"],
+    }
 
 
-def _trial(page: Markup, row: Facts) -> list[str]:
+def _trial(page: Markup, row: Facts, two: bool) -> list[str]:
     return [
-        escaped(row["trial"]),
+        named(row["trial"]),
         NOTHING if row["pca"] is None else f"{row['pca']:g}",
         page.cell(_percent(row["noise_sd_f0"]), "noise"),
-        page.cell(_percent(row["before_rmsd_f0"]), "rmsd"),
-        page.cell(_percent(row["after_rmsd_f0"]), "rmsd"),
-        page.cell(_percent(row["heldout_before_f0"]), "heldout_rmsd"),
-        page.cell(_percent(row["heldout_after_f0"]), "heldout_rmsd"),
+        *_errors(page, row, two),
     ]
+
+
+def _errors(page: Markup, row: Facts, two: bool) -> list[str]:
+    """Fitted and left out, of the base model and, where there is one, of the other."""
+    cells = []
+    for before, after, how in (
+        ("before_rmsd_f0", "after_rmsd_f0", "rmsd"),
+        ("heldout_before_f0", "heldout_after_f0", "heldout_rmsd"),
+    ):
+        cells += [page.cell(_percent(row[key]), how) for key in ((before, after) if two else (before,))]
+    return cells
 
 
 def profile(page: Markup, written: Written) -> str:
@@ -193,8 +207,8 @@ def _nuisance(page: Markup, row: Facts) -> list[str]:
         value += f" ± {digits(row['sd'], 2)}"
     prior = None if row["prior_sd"] is None else digits(row["prior_sd"], 2)
     return [
-        prose(human(str(row["name"]))),
-        NOTHING if row["group"] is None else escaped(row["group"]),
+        named(human(str(row["name"]))),
+        NOTHING if row["group"] is None else named(row["group"]),
         page.cell(value, "nuisances"),
         page.cell(prior, "nuisances"),
         _unit(row["unit"]),
@@ -207,7 +221,7 @@ def _parameter(page: Markup, row: Facts) -> list[str]:
     if start and fitted is not None:
         change = f"{100.0 * (fitted / start - 1.0):+.0f} %".replace("-", "−")
     return [
-        escaped(row["name"]),
+        named(row["name"]),
         page.cell(None if start is None else digits(start, 3), "base_parameters"),
         page.cell(None if fitted is None else digits(fitted, 3), "base_parameters"),
         page.cell(change, "base_parameters"),

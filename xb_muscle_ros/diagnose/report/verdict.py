@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from xb_muscle_ros.diagnose.report.markup import Markup, escaped, listed, prose
-from xb_muscle_ros.diagnose.summary import summary_pieces, summary_text, together
+from xb_muscle_ros.diagnose.sentences import together
+from xb_muscle_ros.diagnose.summary import summary_pieces, summary_text
 from xb_muscle_ros.diagnose.words import chance, family_words, human, joined, likely, meaning, percent
 
 Facts = Mapping[str, Any]
@@ -107,6 +108,8 @@ def checks(page: Markup, facts: Facts) -> str:
         return ""
     failed = sum(1 for row in facts["checks"] if row["passed"] is False)
     summary = "All passed." if not failed else f"{failed} of {len(items)} failed."
+    if failed and facts["verdict"] in ("none", "parameters"):
+        summary += " Where nothing is missing they are not expected to pass."
     return f"<h2>Checks</h2><p>What has to hold before a mechanism is named. {summary}</p>{listed(items, 'list')}"
 
 
