@@ -1,0 +1,309 @@
+"""Sentences that verdicts share, in pieces whose numbers know how they were computed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from xb_muscle_ros.diagnose.words import (
+    SCALES,
+    chance,
+    family_of,
+    human,
+    joined,
+    likely,
+    meaning,
+    parts,
+    percent,
+    phase_words,
+    quantity,
+)
+
+Facts = Mapping[str, Any]
+
+_MOST_CHANGES = 3
+# Parameters that moved less than this share are not worth a word.
+_CHANGED = 0.02
+# Below this share of the mean square a law describes nothing.
+LAW = 0.2
+# Where the mean is less than this share of the root mean square, a residual goes both ways.
+ONE_WAY = 0.5
+_PULLS = {1: "harder than the model", -1: "less than the model", 0: "now harder, now less than the model"}
+
+
+class Piece(NamedTuple):
+    """A piece of a sentence.
+
+    Attributes:
+        text: as it reads.
+        how: where it is a number, the entry of ``how`` that tells how it was computed.
+    """
+
+    text: str
+    how: str | None = None
+
+
+class Located(NamedTuple):
+    """Where the largest mismatch lies.
+
+    Attributes:
+        phase: its name.
+        sign: 1 where the fibre pulls harder than the model, -1 where less, 0 where both.
+        size_f0: largest there.
+        rows: mismatches of the same phase and sign.
+        others: further phases, in order of size.
+    """
+
+    phase: str
+    sign: int
+    size_f0: float
+    rows: tuple[Facts, ...]
+    others: tuple[str, ...]
+
+
+Sentence = list[Piece]
+
+
+def together(facts: Facts) -> bool:
+    """Whether several names in the answer act together, rather than being rivals that cannot be told apart."""
+    answer = facts["answer"]
+    if facts["verdict"] == "ambiguous" or len(answer) < 2:
+        return False
+    best = next((row for row in facts["candidates"] if row["name"] != "base"), None)
+    if best is not None and best["kind"] == "pair":
+        return set(parts(str(best["name"]))) == set(answer)
+    families = {family_of(str(name)) for name in answer}
+    return not (facts["family"] and families == {facts["family"]})
+
+
+def located(facts: Facts) -> Located | None:
+    """Where the largest mismatch lies; None where none was found."""
+    rows = [row for row in facts["mismatch"] if row["size_f0"] is not None and row["phase"] is not None]
+    if not rows:
+        return None
+    first = max(rows, key=lambda row: float(row["size_f0"]))
+    sign = direction(first)
+    same = tuple(row for row in rows if row["phase"] == first["phase"] and direction(row) == sign)
+    others = tuple(dict.fromkeys(str(row["phase"]) for row in rows if row["phase"] != first["phase"]))
+    return Located(str(first["phase"]), sign, float(first["size_f0"]), same, others)
+
+
+def direction(row: Facts) -> int:
+    """1 where the fibre pulls harder than the model, -1 where less, 0 where it changes within the span."""
+    size, mean = row["size_f0"], row["mean_f0"]
+    if size is not None and mean is not None and abs(mean) < ONE_WAY * size:
+        return 0
+    sign = row["sign"] or 0
+    return (sign > 0) - (sign < 0)
+
+
+def fibre_words(facts: Facts) -> str:
+    """The fibre, by name where it has one."""
+    return f"fibre {facts['fibre']}" if facts["fibre"] else "the fibre"
+
+
+def answer_names(facts: Facts) -> list[str]:
+    """Names in the answer, best first."""
+    return [str(name) for name in facts["answer"]]
+
+
+def _error(facts: Facts, which: str) -> tuple[float | None, str]:
+    """Error on trials left out of the fit, or on those fitted where there were none left out."""
+    group = facts[which]
+    if group["heldout_rmsd_f0"] is not None:
+        return group["heldout_rmsd_f0"], "heldout_rmsd"
+    return group["train_rmsd_f0"], "rmsd"
+
+
+def how_well(facts: Facts, does: str) -> list[Sentence]:
+    """How closely the base model follows the recordings."""
+    error, how = _error(facts, "before")
+    if error is None:
+        return [[Piece(f"The model {does} {fibre_words(facts)}.")]]
+    sentence = [Piece(f"The model {does} {fibre_words(facts)} to within "), Piece(f"{percent(error)} % F0", how)]
+    return [[*sentence, *_noise(facts), Piece(".")]]
+
+
+def _noise(facts: Facts) -> Sentence:
+    levels = sorted(float(row["noise_sd_f0"]) for row in facts["trials"] if row["noise_sd_f0"] is not None)
+    if not levels:
+        return []
+    return [Piece(". The noise of the recordings is "), Piece(f"{percent(levels[len(levels) // 2])} % F0", "noise")]
+
+
+def difference(facts: Facts) -> list[Sentence]:
+    """How large the difference is, and where."""
+    error, how = facts["before"]["train_rmsd_f0"], "rmsd"
+    if error is None:
+        error, how = _error(facts, "before")
+    out: list[Sentence] = [[Piece(f"The model differs from the recordings of {fibre_words(facts)}.")]]
+    if error is not None:
+        out = [[
+            Piece("Fitted as well as it can be, the model still differs from the recordings of "),
+            Piece(f"{fibre_words(facts)} by "),
+            Piece(f"{percent(error)} % F0", how),
+            *_noise(facts),
+            Piece("."),
+        ]]  # fmt: skip
+    where = located(facts)
+    if where is None:
+        return out
+    out.append([
+        Piece(f"The difference is largest in the {phase_words(where.phase)} {_conditions(facts, where)}. "
+              f"There the fibre pulls {_PULLS.get(where.sign, _PULLS[0])}, by up to "),
+        Piece(f"{percent(where.size_f0)} % F0", "mismatch"),
+        Piece("." if not where.others else
+              f". Smaller differences lie in the {joined([phase_words(p) for p in where.others[:2]])}."),
+    ])  # fmt: skip
+    return out
+
+
+def _conditions(facts: Facts, where: Located) -> str:
+    pca_of = {row["trial"]: row["pca"] for row in facts["trials"]}
+    names = list(dict.fromkeys(row["trial"] for row in where.rows))
+    levels = sorted({float(pca_of[name]) for name in names if pca_of.get(name) is not None}, reverse=True)
+    total = len(facts["trials"])
+    count = f"of all {total} trials" if len(names) == total else f"of {len(names)} of {total} trials"
+    if not levels:
+        return f"of trial {names[0]}" if len(names) == 1 else count
+    solutions = f"pCa {levels[0]:g}" if len(levels) == 1 else f"pCa {levels[0]:g} to {levels[-1]:g}"
+    return f"at {solutions}" if len(names) == 1 else f"{count} ({solutions})"
+
+
+def explained(facts: Facts, names: Sequence[str]) -> str:
+    """Names with what they mean."""
+    told = [f"{human(name)}, {meaning(name)}" if meaning(name) else human(name) for name in names]
+    return joined(told, "together with") if told else "not named"
+
+
+def parameter_value(facts: Facts) -> Sentence:
+    """Value and interval of the new parameter, then the full stop."""
+    answer = set(answer_names(facts))
+    row = next((row for row in facts["candidates"] if set(parts(str(row["name"]))) == answer), None)
+    if row is None or len(row["parameters"]) != 1 or not answer:
+        return [Piece(".")]
+    ((name, value),) = row["parameters"].items()
+    interval = row["interval"].get(name)
+    unit = facts["profile"]["unit"] if facts["profile"] and facts["profile"]["parameter"] == name else None
+    if value is None:
+        return [Piece(".")]
+    out = [Piece(". Its parameter "), Piece(f"{name} is {quantity(value, unit)}", "parameters")]
+    if interval and None not in interval:
+        out += [Piece(", with 95 % certainty between "), Piece(f"{quantity(interval[0], None)}", "interval")]
+        out += [Piece(" and "), Piece(f"{quantity(interval[1], unit)}", "interval")]
+    return [*out, Piece(".")]
+
+
+def gain(facts: Facts, when: str) -> list[Sentence]:
+    """What the answer does to the error, beside what a flexible curve does."""
+    (before, how), (after, how_after) = _error(facts, "before"), _error(facts, "after")
+    if before is None or after is None or how != how_after:
+        return []
+    trials = "trials left out of the fit" if how == "heldout_rmsd" else "the trials fitted"
+    moves = "falls" if after < before else "rises"
+    out = [
+        Piece(f"{when}, the error on {trials} {moves} from "),
+        Piece(percent(before), how),
+        Piece(" to "),
+        Piece(f"{percent(after)} % F0", how),
+    ]
+    bound = facts["flexible_bound_rmsd_f0"]
+    if bound is not None and how == "heldout_rmsd":
+        out += [
+            Piece(". A flexible curve without any physics gets to "),
+            Piece(f"{percent(bound)} % F0", "flexible_bound"),
+        ]
+    return [[*out, Piece(".")]]
+
+
+def sureness(facts: Facts) -> list[Sentence]:
+    """How likely the answer is the right one."""
+    share = facts["confidence"]
+    if share is None:
+        return []
+    return [
+        [
+            Piece(f"That this is the right explanation among those tried is {likely(share)} ("),
+            Piece(f"{100.0 * share:.0f} %", "confidence"),
+            Piece(")."),
+        ]
+    ]
+
+
+def by_chance(facts: Facts, what: str) -> list[Sentence]:
+    """How often chance does as much."""
+    p_value = facts["p_value"]
+    if p_value is None:
+        return []
+    if facts["verdict"] in ("none", "parameters"):
+        return [[Piece(f"{what}: chance alone leaves as much "), Piece(chance(p_value), "p_value"), Piece(".")]]
+    return [[Piece(f"{what} comes about by chance "), Piece(chance(p_value), "p_value"), Piece(".")]]
+
+
+def changes(facts: Facts) -> list[Sentence]:
+    """The parameters that moved most."""
+    moved = []
+    for row in facts["base_parameters"]:
+        start, fitted = row["start"], row["fitted"]
+        if start is None or fitted is None:
+            continue
+        share = abs(fitted - start) / max(abs(start), abs(fitted), 1e-300)
+        if share >= _CHANGED:
+            moved.append((share, row))
+    moved.sort(key=lambda pair: -pair[0])
+    if not moved:
+        return []
+    pieces = [Piece("The values that changed most: ")]
+    for i, (_, row) in enumerate(moved[:_MOST_CHANGES]):
+        pieces.append(Piece(("; " if i else "") + f"{row['name']} from {quantity(row['start'], None)} to "))
+        pieces.append(Piece(quantity(row["fitted"], row["unit"]), "base_parameters"))
+    return [[*pieces, Piece(".")]]
+
+
+def memory_law(facts: Facts) -> list[Sentence]:
+    """What is left, as a law of the velocity's history."""
+    kernel = facts["kernel"]
+    if kernel is None or kernel["time_constant_s"] is None:
+        return []
+    share = kernel["explained"]
+    if share is not None and share < LAW:
+        return [[
+            Piece("It follows no simple memory of the speed of length change: that accounts for "),
+            Piece(f"{100.0 * share:.0f} %", "kernel"),
+            Piece(" of it."),
+        ]]  # fmt: skip
+    out = [Piece("What is left follows the speed of length change and fades with a time constant of ")]
+    out.append(Piece(f"{quantity(1e3 * kernel['time_constant_s'], 'ms')}", "kernel"))
+    if kernel["scales_with"] in SCALES:
+        out.append(Piece(f"; it {SCALES[kernel['scales_with']]}"))
+    if share is not None:
+        out += [Piece(". This law accounts for "), Piece(f"{100.0 * share:.0f} %", "kernel")]
+        out.append(Piece(" of it, but describes rather than explains"))
+    return [[*out, Piece(".")]]
+
+
+def next_step(facts: Facts) -> list[Sentence]:
+    """The experiment proposed, else what would help."""
+    planned = facts["next_experiment"]
+    if planned is None:
+        return what_helps(facts)
+    out = [Piece("Next: run the protocol in the folder next_experiment")]
+    if planned["protocol"]:
+        out = [Piece(f"Next experiment: {str(planned['protocol']).strip().rstrip('.')}")]
+    names = [human(str(name)) for name in planned["separates"] or ()]
+    if planned["expected_difference_f0"] is not None and len(names) > 1:
+        out.append(Piece(f". There {joined(names)} should differ by "))
+        out.append(Piece(f"{percent(planned['expected_difference_f0'])} % F0", "next_experiment"))
+    return [[*out, Piece(".")]]
+
+
+def what_helps(facts: Facts) -> list[Sentence]:
+    """The first thing that is missing."""
+    if not facts["missing"]:
+        return []
+    return [[Piece(f"What would tell more: {str(facts['missing'][0]).strip().rstrip('.')}.")]]
+
+
+def well_below(value: float, reference: float | None) -> bool:
+    """Whether an error is lower by a tenth at least."""
+    return reference is not None and value < 0.9 * reference

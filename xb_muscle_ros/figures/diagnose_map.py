@@ -1,0 +1,131 @@
+"""Where the model fails: residual over trials and phases, of the base and of the augmented model side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.diagnose.sentences import ONE_WAY
+from xb_muscle_ros.diagnose.words import percent, phase_words
+from xb_muscle_ros.figures.diagnose_common import (
+    WIDTH_MM,
+    Array,
+    after_name,
+    by_activation,
+    label,
+    pages,
+    svg,
+    trial_label,
+)
+from xb_muscle_ros.figures.style import figure
+
+_PER_PAGE = 24
+_SIGNIFICANT = 0.05
+_DARK = 0.75
+# Smaller differences matter to nobody, so they do not get the strongest colours (% F0).
+_FLOOR = 0.3
+
+
+def draw_map(facts: Mapping[str, Any]) -> list[str]:
+    """Pages of at most 24 trials, from low to high calcium, as SVG; none where there is no map.
+
+    Colour and upper number are the mean residual of the cell, the lower number its root mean square, both in % F0. A
+    heavy frame marks cells that differ from zero by more than chance (family-wise p < 0.05).
+    """
+    maps = [facts["map"], facts["map_after"]]
+    if maps[1] is not None and maps[0] is not None and maps[1]["rms_f0"] == maps[0]["rms_f0"]:
+        maps.pop()
+    maps = [table for table in maps if table is not None]
+    first = maps[0] if maps else None
+    if first is None or not first["trials"] or not first["phases"]:
+        return []
+    pca_of = {row["trial"]: row["pca"] for row in facts["trials"]}
+    rows = [{"trial": name, "pca": pca_of.get(name)} for name in first["trials"]]
+    limit = max([_FLOOR, *(float(np.nanmax(np.abs(m))) for m in map(_means, maps) if np.any(np.isfinite(m)))])
+    drawn = []
+    for chosen in pages(by_activation(rows), _PER_PAGE):
+        names = [rows[i]["trial"] for i in chosen]
+        with figure(WIDTH_MM if len(maps) > 1 else 0.66 * WIDTH_MM, 33.0 + 6.8 * len(chosen)) as made:
+            axes = made.subplots(1, len(maps), squeeze=False, sharey=True)[0]
+            image = None
+            for axis, table, title in zip(axes, maps, ("base model", after_name(facts)), strict=False):
+                image = _cells(axis, table, names, limit)
+                axis.set_title(title, loc="left")
+            axes[0].set_yticks(range(len(chosen)), [trial_label(rows[i], 30) for i in chosen], fontsize=6.5)
+            bar = made.colorbar(image, ax=list(axes), location="bottom", shrink=0.45, aspect=40, pad=0.02)
+            bar.set_label("mean of measured minus model (% F$_0$)")
+            bar.outline.set_visible(False)
+            drawn.append(svg(made))
+    return drawn
+
+
+def _means(table: Mapping[str, Any]) -> Array:
+    return 100.0 * _array(table["mean_f0"], len(table["trials"] or ()), len(table["phases"] or ()))
+
+
+def _array(cells: Any, rows: int, columns: int) -> Array:
+    """Cells with NaN for None; all NaN where there are none."""
+    if not cells:
+        return np.full((rows, columns), np.nan)
+    return np.array([[np.nan if c is None else float(c) for c in row] for row in cells])
+
+
+def _cells(axis: Any, table: Mapping[str, Any], names: list[str], limit: float) -> Any:
+    from matplotlib.patches import Rectangle
+
+    places = {name: i for i, name in enumerate(table["trials"])}
+    shape = (len(table["trials"]), len(table["phases"]))
+    take = [places[name] for name in names if name in places]
+    mean, rms, p_value = (
+        _array(table[key], *shape)[take] * factor
+        for key, factor in (("mean_f0", 100.0), ("rms_f0", 100.0), ("p_value", 1.0))
+    )
+    edges = [np.arange(n + 1) - 0.5 for n in mean.shape]
+    image = axis.pcolormesh(
+        edges[1], edges[0], mean, cmap=_colours(), vmin=-limit, vmax=limit, edgecolors="white", linewidth=0.6
+    )
+    axis.set_ylim(mean.shape[0] - 0.5, -0.5)
+    for i, j in np.ndindex(mean.shape):
+        box = (j - 0.5, i - 0.5)
+        if not np.isfinite(mean[i, j]) and not np.isfinite(rms[i, j]):
+            axis.add_patch(
+                Rectangle(box, 1.0, 1.0, facecolor="#f2f2f2", edgecolor="#c4c4c4", hatch="////", linewidth=0)
+            )
+            continue
+        colour = "white" if abs(mean[i, j]) > _DARK * limit else "black"
+        if np.isfinite(mean[i, j]):
+            axis.text(j, i - 0.16, _signed(mean[i, j], limit), ha="center", va="center", fontsize=6.5, color=colour)
+        if np.isfinite(rms[i, j]):
+            both = abs(mean[i, j]) < ONE_WAY * rms[i, j] and p_value[i, j] < _SIGNIFICANT
+            axis.text(
+                j, i + 0.26, ("±" if both else "") + percent(rms[i, j] / 100.0), ha="center", va="center", color=colour,
+                fontsize=5.4 if both else 4.8, fontweight="bold" if both else "normal",
+            )  # fmt: skip
+        if p_value[i, j] < _SIGNIFICANT:
+            inner = (box[0] + 0.03, box[1] + 0.06)
+            axis.add_patch(Rectangle(inner, 0.94, 0.88, fill=False, edgecolor="black", linewidth=1.3))
+    axis.set_xticks(
+        range(shape[1]),
+        [label(phase_words(str(p)), 24) for p in table["phases"]],
+        rotation=35,
+        ha="right",
+        fontsize=6.5,
+    )
+    axis.tick_params(length=0)
+    axis.spines[:].set_visible(False)
+    return image
+
+
+def _colours() -> Any:
+    """Violet over white to orange, without the ends in which both are black."""
+    import matplotlib as mpl
+
+    return mpl.colors.ListedColormap(mpl.colormaps["PuOr_r"](np.linspace(0.1, 0.9, 256)))
+
+
+def _signed(value_percent: float, limit: float) -> str:
+    """With as many digits in all cells as the largest needs."""
+    text = f"{value_percent:+.{1 if limit >= 10.0 else 2}f}"
+    return text.replace("-", "−") if float(text) else "0"

@@ -1,0 +1,155 @@
+"""Every trial of a diagnosis: length, force measured and modelled, and what is left between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.diagnose.sentences import direction
+from xb_muscle_ros.diagnose.written import Trace
+from xb_muscle_ros.figures.diagnose_common import (
+    WIDTH_MM,
+    Array,
+    after_name,
+    by_activation,
+    pages,
+    svg,
+    thinned,
+    trial_label,
+)
+from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
+
+_COLUMNS = 3
+_PER_PAGE = 9
+_HEAD_MM = 7.0
+_ROW_MM = 74.0
+_TITLE_MM = 4.5
+_HEIGHTS_MM = (8.0, 33.0, 15.0)
+_LEFT_MM = 18.5
+_GAP_MM = 10.0
+_PANEL_MM = (WIDTH_MM - _LEFT_MM - 1.5 - (_COLUMNS - 1) * _GAP_MM) / _COLUMNS
+_SHADE = "#dfe5ee"
+_DASHED = (0, (4, 1.6))
+
+
+def draw_traces(facts: Mapping[str, Any], traces: Sequence[Trace]) -> list[str]:
+    """Pages of at most nine trials, from low to high calcium, as SVG.
+
+    Where mismatch was located the time is shaded, and marked + where the fibre pulls harder than the base model. The
+    residual, measured minus model, has the same scale in all trials.
+    """
+    rows = facts["trials"]
+    order = by_activation(rows)
+    limit = _residual_limit(traces)
+    drawn = []
+    for chosen in pages(order, _PER_PAGE):
+        lines = -(-len(chosen) // _COLUMNS)
+        height = _HEAD_MM + lines * _ROW_MM
+        with figure(WIDTH_MM, height) as made:
+            # Panels of the same size at fixed places: rows compare, and many trials draw fast.
+            made.set_layout_engine("none")
+            handles: dict[str, Any] = {}
+            for k, i in enumerate(chosen):
+                axes = _place(made, height, k // _COLUMNS, k % _COLUMNS)
+                _spans(axes, facts, rows[i]["trial"])
+                handles |= _panel(axes, traces[i], after_name(facts))
+                axes[0].set_title(trial_label(rows[i], 34), loc="left", fontsize=7, pad=3)
+                axes[2].set_ylim(-limit, limit)
+                _labels(axes, first=k % _COLUMNS == 0, last=k + _COLUMNS >= len(chosen))
+            made.legend(
+                handles=list(handles.values()), loc="upper center", ncols=4, frameon=False, bbox_to_anchor=(0.5, 1.0)
+            )
+            drawn.append(svg(made))
+    return drawn
+
+
+def _place(made: Any, height_mm: float, line: int, column: int) -> tuple[Any, Any, Any]:
+    """Axes of one trial: length, force, residual."""
+    left = (_LEFT_MM + column * (_PANEL_MM + _GAP_MM)) / WIDTH_MM
+    top_mm = _HEAD_MM + line * _ROW_MM + _TITLE_MM
+    made_axes: list[Any] = []
+    for tall in _HEIGHTS_MM:
+        box = (left, 1.0 - (top_mm + tall) / height_mm, _PANEL_MM / WIDTH_MM, tall / height_mm)
+        made_axes.append(made.add_axes(box, sharex=made_axes[0] if made_axes else None))
+        top_mm += tall + 2.2
+    return made_axes[0], made_axes[1], made_axes[2]
+
+
+def _panel(axes: tuple[Any, Any, Any], trace: Trace, after: str) -> dict[str, Any]:
+    top, middle, bottom = axes
+    handles: dict[str, Any] = {}
+    if trace.length_l0 is not None:
+        top.plot(*thinned(trace.time_s, 100.0 * trace.length_l0), color="black", linewidth=0.9)
+    if trace.measured_f0 is not None:
+        (handles["measured"],) = middle.plot(
+            *thinned(trace.time_s, trace.measured_f0), color=DATA, linewidth=2.8, label="measured"
+        )
+    bottom.axhline(0.0, color="black", linewidth=0.5)
+    for name, values, colour, style, width in _models(trace, after):
+        (handles[name],) = middle.plot(
+            *thinned(trace.time_s, values), color=colour, linestyle=style, linewidth=width, label=name
+        )
+        if trace.measured_f0 is not None:
+            left = 100.0 * (trace.measured_f0 - values)
+            bottom.plot(*thinned(trace.time_s, left), color=colour, linestyle=style, linewidth=width)
+    middle.set_ylim(bottom=min(0.0, middle.get_ylim()[0]))
+    return handles
+
+
+def _models(trace: Trace, after_is: str = "augmented model") -> list[tuple[str, Array, str, Any, float]]:
+    """The base model, and the augmented one where it is another."""
+    found: list[tuple[str, Array, str, Any, float]] = []
+    before, after = trace.before_f0, trace.after_f0
+    if before is not None:
+        found.append(("base model", before, SECOND, _DASHED, 1.0))
+    if after is not None and (before is None or not np.array_equal(before, after, equal_nan=True)):
+        found.append((after_is, after, MODEL, "-", 1.0))
+    return found
+
+
+def _spans(axes: Sequence[Any], facts: Mapping[str, Any], trial: str) -> None:
+    for row in facts["mismatch"]:
+        if row["trial"] != trial or row["start_s"] is None or row["end_s"] is None:
+            continue
+        for axis in axes:
+            axis.axvspan(row["start_s"], row["end_s"], color=_SHADE, linewidth=0)
+        mark = {1: "+", -1: "−", 0: "±"}[direction(row)]
+        axes[2].text(
+            (row["start_s"] + row["end_s"]) / 2.0, 0.99, mark, transform=axes[2].get_xaxis_transform(),
+            ha="center", va="top", fontsize=8, fontweight="bold", clip_on=True,
+        )  # fmt: skip
+
+
+def _labels(axes: tuple[Any, Any, Any], first: bool, last: bool) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    top, middle, bottom = axes
+    for axis in (top, middle):
+        axis.tick_params(labelbottom=False)
+    for axis, most in ((top, 2), (middle, 5), (bottom, 4)):
+        axis.yaxis.set_major_locator(MaxNLocator(most))
+    bottom.xaxis.set_major_locator(MaxNLocator(5))
+    for axis in axes:
+        axis.tick_params(length=2.5, width=0.6, pad=2, labelsize=7)
+    if first:
+        top.set_ylabel("ΔL\n(% L$_0$)")
+        middle.set_ylabel("Force (F$_0$)")
+        bottom.set_ylabel("Residual\n(% F$_0$)")
+        for axis in axes:
+            axis.yaxis.set_label_coords(-9.8 / _PANEL_MM, 0.5)
+    if last:
+        bottom.set_xlabel("Time (s)")
+
+
+def _residual_limit(traces: Sequence[Trace]) -> float:
+    """Largest residual of all trials, % F0, with some room above."""
+    sizes = [
+        100.0 * float(np.nanmax(np.abs(trace.measured_f0 - values)))
+        for trace in traces
+        if trace.measured_f0 is not None
+        for _, values, *_ in _models(trace)
+        if np.any(np.isfinite(trace.measured_f0 - values))
+    ]
+    return 1.2 * max([*sizes, 0.3])
