@@ -95,7 +95,7 @@ def held_out(
         mse: dict[str, float] = {}
         for j, fold in enumerate(folds):
             row = rows[i * len(folds) + j]
-            mse.update(row["heldout_mse"] if row is not None else {name: _NOWHERE for name in fold})
+            mse.update(row["heldout_mse"] if row is not None else dict.fromkeys(fold, _NOWHERE))
         found[fit.explanation.label] = HeldOut(mse, samples)
     return found
 

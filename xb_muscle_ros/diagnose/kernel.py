@@ -79,7 +79,7 @@ class Law(NamedTuple):
 
 
 def memories(time_s: Array, length_l0: Array, tau_s: Array) -> Array:
-    """x' = v - x/τ from rest at the first sample, exact for length that is straight between samples.
+    """X' = v - x/τ from rest at the first sample, exact for length that is straight between samples.
 
     Args:
         time_s, length_l0: shape (n,), s and L0.
@@ -184,9 +184,7 @@ class _Products:
         return 1.0 - missed / float(self.target @ self.target)
 
 
-def scales(
-    residuals: Sequence[Residual], fit: LinearFit, scalings: Mapping[str, Sequence[Array]]
-) -> dict[str, Array]:
+def scales(residuals: Sequence[Residual], fit: LinearFit, scalings: Mapping[str, Sequence[Array]]) -> dict[str, Array]:
     """What a law may scale with, all trials one below the other, the constant first."""
     check(residuals)
     sizes = [r.time_s.size for r in residuals]

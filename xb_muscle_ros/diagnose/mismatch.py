@@ -128,5 +128,3 @@ def rmsd(measured: Sequence[Array], predicted: Sequence[Array]) -> float:
     """Root-mean-square difference over all samples of all trials, F0."""
     squares = sum(float(np.sum((m - p) ** 2)) for m, p in zip(measured, predicted, strict=True))
     return float(np.sqrt(squares / sum(m.size for m in measured)))
-
-

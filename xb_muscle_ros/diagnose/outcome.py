@@ -337,4 +337,4 @@ def _write_traces(path: Path, o: Outcome) -> None:
         arrays[f"t{i}_before_f0"] = base[i]
         arrays[f"t{i}_after_f0"] = shown[i]
     with replaced(path) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+        np.savez_compressed(file, **arrays)

@@ -51,8 +51,8 @@ class Fit:
 def refit_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
     """Fit an explanation from the best of several starts; None where the model has no solution at any.
 
-    The task holds ``study``, ``names``, ``starts`` (mappings of values), ``held_out`` (names of trials), ``most`` (points
-    to try from the best start), ``predict`` (whether to say how well held-out trials are predicted).
+    The task holds ``study``, ``names``, ``starts`` (mappings of values), ``held_out`` (names of trials), ``most``
+    (points to try from the best start), ``predict`` (whether to say how well held-out trials are predicted).
     """
     study = Study.from_json(task["study"])
     explanation = explanation_of(task["names"])

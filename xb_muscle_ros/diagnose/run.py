@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -11,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.diagnose.crossval import HeldOut, folds_of, held_out
+from xb_muscle_ros.diagnose.crossval import folds_of, held_out
 from xb_muscle_ros.diagnose.mismatch import Recordings, rmsd, simulated
 from xb_muscle_ros.diagnose.names import MECHANISMS, Name
 from xb_muscle_ros.diagnose.next_experiment import Proposal, propose
 from xb_muscle_ros.diagnose.outcome import Outcome, as_json, write
-from xb_muscle_ros.diagnose.profile import Known, known
+from xb_muscle_ros.diagnose.profile import known
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.screen import Linear
 from xb_muscle_ros.diagnose.search import QUICK, Effort, Search, Searcher, penalised
@@ -123,6 +122,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
             interval=interval.interval if interval else None,
             at_bound=interval.at_bound if interval else False,
             cleaned=_cleaned(before, after),
+            described=_described(recordings, search, measured),
         )
     )
     return Outcome(
@@ -194,6 +194,17 @@ def _proposal(search: Search, decision: Decision, trials: Sequence[Trial]) -> Pr
     return propose(search.study, first, second, chosen)
 
 
+# More noise than this hides what is looked for, F0; a base that leaves more than this share of the force's standard
+# deviation does not describe the recordings.
+_NOISY_F0, _UNDESCRIBED = 0.02, 0.5
+
+
+def _described(recordings: Recordings, search: Search, measured: Sequence[Any]) -> bool:
+    """Whether there is anything to build on."""
+    spread = float(np.std(np.concatenate(list(measured))))
+    return recordings.noise_rms_f0(search.study) <= _NOISY_F0 and search.base.rmsd_f0 <= _UNDESCRIBED * spread
+
+
 def _missing(
     recordings: Recordings, search: Search, folds: Sequence[frozenset[str]], measured: Sequence[Any]
 ) -> list[str]:
@@ -202,10 +213,10 @@ def _missing(
     if not folds:
         lines.append("at least three trials, so that some can be held out: without that no mechanism is named")
     noise = recordings.noise_rms_f0(search.study)
-    if noise > 0.02:
+    if noise > _NOISY_F0:
         lines.append(f"force with less noise: {100 * noise:.1f} % F0 hides what is looked for")
     spread = float(np.std(np.concatenate(list(measured))))
-    if search.base.rmsd_f0 > 0.5 * spread:
+    if search.base.rmsd_f0 > _UNDESCRIBED * spread:
         lines.append(
             "recordings that the model describes at all: after the fit half of the force's variation is left; check "
             "that channels, units, calcium and fibre belong together"
@@ -213,5 +224,3 @@ def _missing(
     if all(t.facts.pca is None or t.facts.pca < 8.0 for t in recordings.trials):
         lines.append("a trial without calcium (pCa 9), which tells passive from active effects")
     return lines
-
-

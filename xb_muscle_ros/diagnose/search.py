@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -129,8 +128,8 @@ class Searcher:
         found = self.fitted([(Explanation(), starts)], "base")
         if not found:
             raise UserError(
-                f"fibre {self.study.fibre.name}, model {self.study.fibre.model}: no solution at the values of the fibre "
-                "file; start from another one"
+                f"fibre {self.study.fibre.name}, model {self.study.fibre.model}: no solution at the values of the "
+                "fibre file; start from another one"
             )
         for _ in range(self.effort.closure):
             self.study = replace(self.study, closure_f0=closure_error(self.study, found[0]))
@@ -210,5 +209,3 @@ def _spread(study: Study) -> list[dict[str, float]]:
         if start and start not in found:
             found.append(start)
     return found
-
-

@@ -77,6 +77,7 @@ class Evidence:
         interval: of the leading mechanism's effect, or None where it has none.
         at_bound: whether that effect ended at a bound.
         cleaned: share of the located cells' mean square that is gone afterwards.
+        described: whether the base describes the recordings at all, and their noise leaves something to be seen.
     """
 
     search: Search
@@ -89,11 +90,14 @@ class Evidence:
     interval: tuple[float, float] | None
     at_bound: bool
     cleaned: float
+    described: bool = True
 
 
 def decide(e: Evidence) -> Decision:
     """The answer that the evidence allows."""
     search = e.search
+    if not e.described:
+        return Decision(Verdict.UNEXPLAINED, (), None, 0.0, (), ())
     if not e.detected:
         fine = e.start_rmsd_f0 <= max(_AS_GOOD * search.base.rmsd_f0, 0.003)
         return Decision(Verdict.NONE if fine else Verdict.PARAMETERS, (), None, _sure(e.p_value), (), ())
@@ -108,7 +112,9 @@ def decide(e: Evidence) -> Decision:
     ties = tuple(n for n, w in weights.items() if n is not lead and w >= _TIE * weights[lead])
     confidence = weights[lead] * max(0.0, min(1.0, share))
     checks = _checks(e, lead, share, weights, bool(mechanisms))
-    answer = tuple(dict.fromkeys((*mechanisms, *faults, *ties))) if mechanisms else tuple(dict.fromkeys((*faults, *ties)))
+    answer = (
+        tuple(dict.fromkeys((*mechanisms, *faults, *ties))) if mechanisms else tuple(dict.fromkeys((*faults, *ties)))
+    )
     family = FAMILY[lead] if all(FAMILY[n] == FAMILY[lead] for n in ties) else None
     if not mechanisms and not faults:
         return Decision(Verdict.UNEXPLAINED, (), None, confidence, checks, ties)
@@ -195,7 +201,9 @@ def _checks(e: Evidence, lead: Name, share: float, weights: Mapping[Name, float]
             checks.append(
                 Check("the interval of its parameter excludes 0", apart, f"{e.interval[0]:.3g} to {e.interval[1]:.3g}")
             )
-        checks.append(Check("its parameter is off its bounds", not e.at_bound, "at a bound" if e.at_bound else "inside"))
+        checks.append(
+            Check("its parameter is off its bounds", not e.at_bound, "at a bound" if e.at_bound else "inside")
+        )
     checks += _heldout_checks(e)
     return tuple(checks)
 

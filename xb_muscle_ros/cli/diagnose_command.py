@@ -1,0 +1,61 @@
+"""``xb_muscle diagnose``: say what physics a simulation left out of recordings."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from xb_muscle_ros.cli.common import add_work, warn, work_options_of
+from xb_muscle_ros.errors import UserError
+
+if TYPE_CHECKING:
+    Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
+
+
+def add(subparsers: Subparsers) -> None:
+    """Add the command to the command line."""
+    parser = subparsers.add_parser(
+        "diagnose",
+        help="say what physics a simulation left out of recordings",
+        description="Locate where recordings and simulation differ, name what is missing, model it and show how well.",
+    )
+    parser.add_argument("bags", nargs="+", type=Path, metavar="BAG", help="bags or folders, in the order of recording")
+    parser.add_argument(
+        "--fiber", "--fibre", dest="fiber", required=True, help="fibre file, or name of a fibre in the package"
+    )
+    parser.add_argument("--model", help="parameter set of the fibre file (default: the one the file names)")
+    parser.add_argument("--method", help="how heads are distributed over strain (default: the fibre file's)")
+    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for report and results")
+    parser.add_argument("--quick", action="store_true", help="look less hard: minutes become tens of seconds")
+    parser.add_argument("--seed", type=int, default=1, help="of the bootstrap (default 1)")
+    parser.add_argument("--overwrite", action="store_true", help="replace a diagnosis that exists")
+    add_work(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Diagnose, print the answer, say where the report is."""
+    from xb_muscle_ros.diagnose.run import diagnose_bags
+
+    out: Path = arguments.out
+    if (out / "diagnosis.json").exists() and not arguments.overwrite:
+        raise UserError(f"{out} holds a diagnosis; use --overwrite to replace it or choose another folder for --out")
+    found = diagnose_bags(
+        arguments.bags,
+        arguments.fiber,
+        out,
+        arguments.quick,
+        arguments.seed,
+        arguments.model,
+        arguments.method,
+        work_options_of(arguments, journal=out / "journal.jsonl"),
+    )
+    for line in found["warnings"]:
+        warn(line)
+    print(found["summary"])
+    print(f"verdict: {found['verdict']}{': ' + ', '.join(found['answer']) if found['answer'] else ''}")
+    for name in ("report.html", "diagnosis.json", found["augmented_fiber"]):
+        if name:
+            print(out / name)
+    return 0
