@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,8 @@ from xb_muscle_ros.figures.style import figure
 
 _PER_PAGE = 24
 _SIGNIFICANT = 0.05
-_DARK = 0.75
+# Below this lightness of a cell its numbers are white.
+_DARK = 0.5
 # Smaller differences matter to nobody, so they do not get the strongest colours (% F0).
 _FLOOR = 0.3
 
@@ -34,23 +36,23 @@ def draw_map(facts: Mapping[str, Any]) -> list[str]:
     Colour and upper number are the mean residual of the cell, the lower number its root mean square, both in % F0. A
     heavy frame marks cells that differ from zero by more than chance (family-wise p < 0.05).
     """
-    maps = [facts["map"], facts["map_after"]]
-    if maps[1] is not None and maps[0] is not None and maps[1]["rms_f0"] == maps[0]["rms_f0"]:
-        maps.pop()
-    maps = [table for table in maps if table is not None]
-    first = maps[0] if maps else None
-    if first is None or not first["trials"] or not first["phases"]:
+    tables = {"base model": facts["map"], after_name(facts): facts["map_after"]}
+    maps = {title: table for title, table in tables.items() if table and table["trials"] and table["phases"]}
+    if not maps:
         return []
+    first, *others = maps.values()
+    if others and others[0]["rms_f0"] == first["rms_f0"]:
+        del maps[after_name(facts)]
     pca_of = {row["trial"]: row["pca"] for row in facts["trials"]}
     rows = [{"trial": name, "pca": pca_of.get(name)} for name in first["trials"]]
-    limit = max([_FLOOR, *(float(np.nanmax(np.abs(m))) for m in map(_means, maps) if np.any(np.isfinite(m)))])
+    limit = max([_FLOOR, *(float(np.nanmax(np.abs(m))) for m in map(_means, maps.values()) if np.any(np.isfinite(m)))])
     drawn = []
     for chosen in pages(by_activation(rows), _PER_PAGE):
         names = [rows[i]["trial"] for i in chosen]
         with figure(WIDTH_MM if len(maps) > 1 else 0.66 * WIDTH_MM, 33.0 + 6.8 * len(chosen)) as made:
             axes = made.subplots(1, len(maps), squeeze=False, sharey=True)[0]
             image = None
-            for axis, table, title in zip(axes, maps, ("base model", after_name(facts)), strict=False):
+            for axis, (title, table) in zip(axes, maps.items(), strict=True):
                 image = _cells(axis, table, names, limit)
                 axis.set_title(title, loc="left")
             axes[0].set_yticks(range(len(chosen)), [trial_label(rows[i], 30) for i in chosen], fontsize=6.5)
@@ -62,7 +64,7 @@ def draw_map(facts: Mapping[str, Any]) -> list[str]:
 
 
 def _means(table: Mapping[str, Any]) -> Array:
-    return 100.0 * _array(table["mean_f0"], len(table["trials"] or ()), len(table["phases"] or ()))
+    return 100.0 * _array(table["mean_f0"], len(table["trials"]), len(table["phases"]))
 
 
 def _array(cells: Any, rows: int, columns: int) -> Array:
@@ -73,13 +75,12 @@ def _array(cells: Any, rows: int, columns: int) -> Array:
 
 
 def _cells(axis: Any, table: Mapping[str, Any], names: list[str], limit: float) -> Any:
-    from matplotlib.patches import Rectangle
-
     places = {name: i for i, name in enumerate(table["trials"])}
     shape = (len(table["trials"]), len(table["phases"]))
-    take = [places[name] for name in names if name in places]
+    # A trial that this map does not know gets the empty row at the end.
+    take = [places.get(name, len(places)) for name in names]
     mean, rms, p_value = (
-        _array(table[key], *shape)[take] * factor
+        np.vstack([_array(table[key], *shape), np.full(shape[1], np.nan)])[take] * factor
         for key, factor in (("mean_f0", 100.0), ("rms_f0", 100.0), ("p_value", 1.0))
     )
     edges = [np.arange(n + 1) - 0.5 for n in mean.shape]
@@ -88,24 +89,7 @@ def _cells(axis: Any, table: Mapping[str, Any], names: list[str], limit: float) 
     )
     axis.set_ylim(mean.shape[0] - 0.5, -0.5)
     for i, j in np.ndindex(mean.shape):
-        box = (j - 0.5, i - 0.5)
-        if not np.isfinite(mean[i, j]) and not np.isfinite(rms[i, j]):
-            axis.add_patch(
-                Rectangle(box, 1.0, 1.0, facecolor="#f2f2f2", edgecolor="#c4c4c4", hatch="////", linewidth=0)
-            )
-            continue
-        colour = "white" if abs(mean[i, j]) > _DARK * limit else "black"
-        if np.isfinite(mean[i, j]):
-            axis.text(j, i - 0.16, _signed(mean[i, j], limit), ha="center", va="center", fontsize=6.5, color=colour)
-        if np.isfinite(rms[i, j]):
-            both = abs(mean[i, j]) < ONE_WAY * rms[i, j] and p_value[i, j] < _SIGNIFICANT
-            axis.text(
-                j, i + 0.26, ("±" if both else "") + percent(rms[i, j] / 100.0), ha="center", va="center", color=colour,
-                fontsize=5.4 if both else 4.8, fontweight="bold" if both else "normal",
-            )  # fmt: skip
-        if p_value[i, j] < _SIGNIFICANT:
-            inner = (box[0] + 0.03, box[1] + 0.06)
-            axis.add_patch(Rectangle(inner, 0.94, 0.88, fill=False, edgecolor="black", linewidth=1.3))
+        _cell(axis, i, j, (float(mean[i, j]), float(rms[i, j]), float(p_value[i, j])), limit)
     axis.set_xticks(
         range(shape[1]),
         [label(phase_words(str(p)), 24) for p in table["phases"]],
@@ -118,6 +102,31 @@ def _cells(axis: Any, table: Mapping[str, Any], names: list[str], limit: float) 
     return image
 
 
+def _cell(axis: Any, i: int, j: int, values: tuple[float, float, float], limit: float) -> None:
+    """Numbers, frame or hatching of one cell."""
+    from matplotlib.patches import Rectangle
+
+    mean, rms, p_value = values
+    if not np.isfinite(mean) and not np.isfinite(rms):
+        box = (j - 0.5, i - 0.5)
+        axis.add_patch(Rectangle(box, 1.0, 1.0, facecolor="#f2f2f2", edgecolor="#c4c4c4", hatch="////", linewidth=0))
+        return
+    red, green, blue, _ = _colours()(0.5 + 0.5 * mean / limit if np.isfinite(mean) else 0.5)
+    colour = "white" if 0.299 * red + 0.587 * green + 0.114 * blue < _DARK else "black"
+    if np.isfinite(mean):
+        axis.text(j, i - 0.16, _signed(mean, limit), ha="center", va="center", fontsize=6.5, color=colour)
+    if np.isfinite(rms):
+        both = abs(mean) < ONE_WAY * rms and p_value < _SIGNIFICANT
+        axis.text(
+            j, i + 0.26, ("±" if both else "") + percent(rms / 100.0), ha="center", va="center", color=colour,
+            fontsize=5.4 if both else 4.8, fontweight="bold" if both else "normal",
+        )  # fmt: skip
+    if p_value < _SIGNIFICANT:
+        frame = (j - 0.47, i - 0.44)
+        axis.add_patch(Rectangle(frame, 0.94, 0.88, fill=False, edgecolor="black", linewidth=1.3))
+
+
+@cache
 def _colours() -> Any:
     """Violet over white to orange, without the ends in which both are black."""
     import matplotlib as mpl

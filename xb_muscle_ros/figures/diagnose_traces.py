@@ -29,7 +29,7 @@ _TITLE_MM = 4.5
 _HEIGHTS_MM = (8.0, 33.0, 15.0)
 _LEFT_MM = 18.5
 _GAP_MM = 10.0
-_PANEL_MM = (WIDTH_MM - _LEFT_MM - 1.5 - (_COLUMNS - 1) * _GAP_MM) / _COLUMNS
+_PANEL_MM = (WIDTH_MM - _LEFT_MM - 3.0 - (_COLUMNS - 1) * _GAP_MM) / _COLUMNS
 _SHADE = "#dfe5ee"
 _DASHED = (0, (4, 1.6))
 
@@ -82,6 +82,7 @@ def _panel(axes: tuple[Any, Any, Any], trace: Trace, after: str) -> dict[str, An
     handles: dict[str, Any] = {}
     if trace.length_l0 is not None:
         top.plot(*thinned(trace.time_s, 100.0 * trace.length_l0), color="black", linewidth=0.9)
+        top.margins(y=0.12)
     if trace.measured_f0 is not None:
         (handles["measured"],) = middle.plot(
             *thinned(trace.time_s, trace.measured_f0), color=DATA, linewidth=2.8, label="measured"
@@ -114,7 +115,7 @@ def _spans(axes: Sequence[Any], facts: Mapping[str, Any], trial: str) -> None:
         if row["trial"] != trial or row["start_s"] is None or row["end_s"] is None:
             continue
         for axis in axes:
-            axis.axvspan(row["start_s"], row["end_s"], color=_SHADE, linewidth=0)
+            axis.axvspan(row["start_s"], row["end_s"], facecolor=_SHADE, edgecolor="white", linewidth=1.0)
         mark = {1: "+", -1: "−", 0: "±"}[direction(row)]
         axes[2].text(
             (row["start_s"] + row["end_s"]) / 2.0, 0.99, mark, transform=axes[2].get_xaxis_transform(),
@@ -152,4 +153,4 @@ def _residual_limit(traces: Sequence[Trace]) -> float:
         for _, values, *_ in _models(trace)
         if np.any(np.isfinite(trace.measured_f0 - values))
     ]
-    return 1.2 * max([*sizes, 0.3])
+    return 1.35 * max([*sizes, 0.3])

@@ -146,8 +146,9 @@ def _files(facts: Facts) -> str:
     if not facts["augmented_fiber"]:
         return ""
     name = escaped(facts["augmented_fiber"])
+    what = "the first of these explanations" if facts["verdict"] == "ambiguous" else "what was found"
     return (
-        f"<p>The model with what was found is the fibre file <code>{name}</code> beside this page. Replay, simulation "
+        f"<p>The model with {what} is the fibre file <code>{name}</code> beside this page. Replay, simulation "
         f"and the node take it as any other: <code>xb_muscle replay BAG --fiber {name}</code>.</p>"
     )
 
