@@ -113,7 +113,7 @@ def as_json(o: Outcome, quick: bool) -> dict[str, Any]:
         "trials": _trials(o),
         "mismatch": o.before.mismatch(0.01) or _whole_mismatch(o),
         "map": o.before.map(),
-        "map_after": o.after.map(),
+        "map_after": (o.before if o.shown is o.search.base else o.after).map(),
         "kernel": _kernel(o.law),
         "nuisances": _nuisances(o),
         "base_parameters": [
