@@ -184,9 +184,7 @@ class _Products:
         return 1.0 - missed / float(self.target @ self.target)
 
 
-def scales(
-    residuals: Sequence[Residual], fit: LinearFit, scalings: Mapping[str, Sequence[Array]]
-) -> dict[str, Array]:
+def scales(residuals: Sequence[Residual], fit: LinearFit, scalings: Mapping[str, Sequence[Array]]) -> dict[str, Array]:
     """What a law may scale with, all trials one below the other, the constant first."""
     check(residuals)
     sizes = [r.time_s.size for r in residuals]
