@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -81,7 +83,7 @@ def test_cells_hold_every_sample_once(parts: list[tuple[str, float]], n: int, fi
     cells = cut(both)
     assert cells[0].begin == 0
     assert cells[-1].end == n + 20
-    assert all(a.end == b.begin for a, b in zip(cells[:-1], cells[1:], strict=True))
+    assert all(a.end == b.begin for a, b in itertools.pairwise(cells))
     assert all(c.end - c.begin >= LEAST_SAMPLES for c in cells if c.trial == "b" or n >= LEAST_SAMPLES)
     assert len({(c.trial, c.phase) for c in cells}) == len(cells)
 

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from xb_muscle_ros.diagnose.cells import Residual
 from xb_muscle_ros.diagnose.flexible import flexible_fit
 from xb_muscle_ros.diagnose.kernel import law, memories
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
@@ -146,7 +147,7 @@ def test_held_out_trial_is_foretold(long_study: Any, scalings: dict[str, list[Ar
 
 def test_nothing_is_invented_for_noise(long_study: Any, scalings: dict[str, list[Array]]) -> None:
     ratios = []
-    for seed in range(10):
+    for seed in range(5):
         held = [i == seed % 5 for i in range(5)]
         study = long_study._replace(fit=held_out_fit(long_study, held))
         residuals = study.after(study.noise(_rng(seed)))
@@ -159,23 +160,24 @@ def test_nothing_is_invented_for_noise(long_study: Any, scalings: dict[str, list
 
 @settings(max_examples=20, deadline=None)
 @given(st.lists(st.integers(2, 40), min_size=1, max_size=4), st.integers(0, 100))
-def test_any_sizes_of_trials(long_study: Any, sizes: list[int], seed: int) -> None:
-    first = long_study.residuals[0]
+def test_any_sizes_of_trials(sizes: list[int], seed: int) -> None:
     random = _rng(seed)
     residuals = [
-        first._replace(
-            trial=str(i),
-            time_s=1e-3 * np.arange(n),
-            value_f0=0.01 * random.normal(size=n),
-            length_l0=0.01 * random.normal(size=n),
-            calcium_um=np.ones(n),
+        Residual(
+            str(i),
+            None,
+            1e-3 * np.arange(n),
+            0.01 * random.normal(size=n),
+            (),
+            0.01 * random.normal(size=n),
+            np.ones(n),
         )
         for i, n in enumerate(sizes)
     ]
     scale = {"activation": [np.ones(n) for n in sizes]}
     fit = LinearFit(np.ones((sum(sizes), 1)), np.ones(sum(sizes)), np.ones(1))
     found = law(residuals, fit, scale)
-    assert found is None or (found.explained > 0.0 and 0.002 <= found.time_constant_s <= 5.0 + 1e-9)
+    assert found is None or (0.0 < found.explained <= 1.0 and 0.00199 < found.time_constant_s < 5.01)
     held = [False] * len(sizes)
     assert flexible_fit(residuals, held, fit, scale).predicted_f0 == ()
 

@@ -24,10 +24,7 @@ Array = npt.NDArray[np.float64]
 @pytest.fixture(scope="module")
 def known(study: Any) -> NoiseModel:
     """Noise from windows so long that it is known."""
-    noise = noise_model(
-        [Window(w.trial, w.step_s, _long(i)) for i, w in enumerate(study.windows(study.noise(_rng(0))))]
-    )
-    return noise
+    return noise_model([Window(w.trial, w.step_s, _long(i)) for i, w in enumerate(study.windows(study.noise(_rng(0))))])
 
 
 def _rng(seed: int) -> np.random.Generator:
@@ -64,12 +61,12 @@ def test_false_alarms_on_noise_that_was_fitted(study: Any, known: NoiseModel) ->
 def test_false_alarms_where_windows_are_short(study: Any) -> None:
     """Noise known from 85 samples a trial only, and more persistent than most."""
     p = []
-    for k in range(24):
+    for k in range(16):
         noise = study.noise(_rng(k), memory=0.97)
         found = significance(study.after(noise), study.fit, noise_model(study.windows(noise)), draws=60, seed=k)
         assert not found.detected()
         p.append(found.overall_p)
-    # 4 and more of 24 at 5 % have a chance of 3 %.
+    # 4 and more of 16 at 5 % have a chance of 1 %.
     assert np.count_nonzero(np.array(p) <= 0.05) <= 3
 
 

@@ -124,7 +124,7 @@ def _luck(gain: Array, silent: Array) -> bool:
         return True
     share = gain / np.maximum(silent, 1e-300)
     error, of_share = (float(np.std(x, ddof=1)) * np.sqrt(gain.size) for x in (gain, share))
-    return float(gain.sum()) < error or float(share.sum()) < 2.0 * of_share
+    return bool(float(gain.sum()) < error or float(share.sum()) < 2.0 * of_share)
 
 
 def _missed(gram: Array, across: Array, silent: Array, samples: npt.NDArray[np.int64]) -> Array:

@@ -79,7 +79,7 @@ class Law(NamedTuple):
 
 
 def memories(time_s: Array, length_l0: Array, tau_s: Array) -> Array:
-    """x' = v - x/τ from rest at the first sample, exact for length that is straight between samples.
+    """Memories x' = v - x/τ from rest at the first sample, exact for length that is straight between samples.
 
     Args:
         time_s, length_l0: shape (n,), s and L0.
