@@ -84,3 +84,9 @@ def make_study(pcas: tuple[float, ...], shared: int, seed: int, recovery_s: floa
 def study() -> Study:
     """Five trials and eight shared coordinates."""
     return make_study(PCAS, 8, 0)
+
+
+@pytest.fixture(scope="session")
+def long_study() -> Study:
+    """The same with half a second of recovery."""
+    return make_study(PCAS, 8, 0, 0.5)

@@ -24,6 +24,8 @@ Array = npt.NDArray[np.float64]
 _TAU_S = np.geomspace(0.002, 5.0, 8)
 # Against the mean square of a column before the fit took its part.
 _RIDGES = np.geomspace(1e-5, 1.0, 11)
+# A smaller share of the mean square is not worth foretelling.
+_LEAST_SHARE = 0.05
 
 
 class Flexible(NamedTuple):
@@ -106,9 +108,7 @@ def _chosen(
         gain = silent - missed
         total = gain.sum(axis=1)
         k = int(np.argmax(total))
-        # A gain that could as well be one trial's luck is none.
-        error = float(np.std(gain[k], ddof=1)) * np.sqrt(len(train)) if len(train) > 1 else np.inf
-        if total[k] > max(error, best[0]):
+        if total[k] > max(best[0], _LEAST_SHARE * silent.sum()) and not _luck(gain[k], silent):
             best = (float(total[k]), tuple(chosen), float(_RIDGES[k]))
     if not best[1]:
         return Flexible(tuple(np.zeros(part.stop - part.start) for part in held), (), 0.0, 0.0)
@@ -116,6 +116,15 @@ def _chosen(
     weights = _ridge(gram.sum(axis=0)[which][:, which], across.sum(axis=0)[which], best[2] * samples.sum())
     told = tuple(columns[part][:, which] @ weights for part in held)
     return Flexible(told, best[1], best[2], best[0] / float(silent.sum()))
+
+
+def _luck(gain: Array, silent: Array) -> bool:
+    """Whether a gain may be one trial's: below its standard error over trials, or, as a share of each, below twice."""
+    if gain.size < 2:
+        return True
+    share = gain / np.maximum(silent, 1e-300)
+    error, of_share = (float(np.std(x, ddof=1)) * np.sqrt(gain.size) for x in (gain, share))
+    return bool(float(gain.sum()) < error or float(share.sum()) < 2.0 * of_share)
 
 
 def _missed(gram: Array, across: Array, silent: Array, samples: npt.NDArray[np.int64]) -> Array:

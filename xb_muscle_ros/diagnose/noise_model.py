@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import minimize
 from scipy.signal import lfilter
 from scipy.special import ndtri
 
@@ -45,6 +44,8 @@ _PRIOR_MEAN = np.array([1.8] + [0.0] * (_ORDER - 1))
 # Models of the noise from which draws come, of how many that were tried, and how much wider than a normal posterior
 # these were; samples until drawn noise forgets how it began.
 _MEMBERS, _TRIED, _WIDER, _BURN_IN = 24, 480, 1.5, 400
+# Newton steps at most; most windows take five.
+_STEPS = 25
 # SD of log-SD of trials without a window around those with one, where a single one has one.
 _SPREAD = 0.7
 
@@ -317,30 +318,43 @@ def _costs(parts: Sequence[_Part], shares: Sequence[float], z: Array) -> Array:
 
 
 def _most_probable(parts: Sequence[_Part], shares: Sequence[float], start: Array) -> Array:
-    """Partial correlations (inverse hyperbolic tangents) at which `_cost` is least, shape (order,)."""
-    step = 1e-5
-    around = step * np.concatenate([np.zeros((1, _ORDER)), np.eye(_ORDER), -np.eye(_ORDER)])
+    """Partial correlations (inverse hyperbolic tangents) at which `_costs` are least, shape (order,).
 
-    def with_slopes(z: Array) -> tuple[float, Array]:
-        costs = _costs(parts, shares, z + around)
-        return float(costs[0]), (costs[1 : _ORDER + 1] - costs[_ORDER + 1 :]) / (2.0 * step)
-
-    bounds = [(-_REACH, _REACH)] * _ORDER
-    found = minimize(with_slopes, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-8})
-    return np.asarray(found.x)
+    Newton's method; downhill also where the costs curve down, and of several lengths of each step the best.
+    """
+    z = start
+    lengths = np.array([0.0, 0.01, 0.1, 0.3, 0.6, 1.0, 1.5])[:, None]
+    for _ in range(_STEPS):
+        slope, values, vectors = _shape(parts, shares, z)
+        step = -vectors @ ((vectors.T @ slope) / np.maximum(np.abs(values), 1.0))
+        points = np.clip(z + lengths * np.clip(step, -1.0, 1.0), -_REACH, _REACH)
+        costs = _costs(parts, shares, points)
+        best = int(np.argmin(costs))
+        z = points[best]
+        if costs[0] - costs[best] < 1e-5:
+            break
+    return z
 
 
 def _spread(parts: Sequence[_Part], shares: Sequence[float], z: Array) -> Array:
     """A root of the covariance of partial correlations around the most probable, shape (order, order)."""
-    moves = 0.05 * np.eye(_ORDER)
-    corners = np.array(
-        [[[(a * x + b * y) for a in (1, -1) for b in (1, -1)] for x in moves] for y in moves], dtype=np.float64
-    )
-    costs = _costs(parts, shares, z + corners.reshape(-1, _ORDER)).reshape(_ORDER, _ORDER, 4)
-    curvature = costs @ np.array([1.0, -1.0, -1.0, 1.0]) / (4.0 * 0.05**2)
-    values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
+    _, values, vectors = _shape(parts, shares, z)
     root: Array = vectors / np.sqrt(np.maximum(values, 1.0 / _PRIOR_SD**2))
     return root
+
+
+def _shape(parts: Sequence[_Part], shares: Sequence[float], z: Array) -> tuple[Array, Array, Array]:
+    """Slope of the costs, and values and vectors of their curvature, by differences."""
+    h = 0.02
+    signs = np.array([(1, 1), (1, -1), (-1, 1), (-1, -1)], dtype=np.float64)
+    moves = signs[:, :, None, None, None] * h * np.eye(_ORDER)[:, None, :]
+    corners = moves[:, 0] + np.swapaxes(moves[:, 1], 1, 2)
+    costs = _costs(parts, shares, z + corners.reshape(-1, _ORDER)).reshape(4, _ORDER, _ORDER)
+    curvature = (costs[0] - costs[1] - costs[2] + costs[3]) / (4.0 * h**2)
+    # Along the diagonal both moves are the same: twice the step.
+    slope = np.diag(costs[0] - costs[3]) / (4.0 * h)
+    values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
+    return slope, values, vectors
 
 
 def _correlation(filters: Array) -> Array:

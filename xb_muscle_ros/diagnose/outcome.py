@@ -287,7 +287,7 @@ def _kind(names: tuple[Name, ...]) -> str:
     return "measurement" if names[0] in MEASUREMENT else "mechanism"
 
 
-def write(out: Path, o: Outcome, found: dict[str, Any]) -> None:
+def write(out: Path, o: Outcome, found: dict[str, Any], report: bool = True) -> None:
     """Write all files of a diagnosis; each appears whole or not at all.
 
     Raises:
@@ -302,7 +302,8 @@ def write(out: Path, o: Outcome, found: dict[str, Any]) -> None:
         write_trial(out / NEXT, scaled(o.proposal.protocol.trial, fibre.reference_length_m, fibre.f0_n))
     _write_traces(out / "traces.npz", o)
     write_text(out / "diagnosis.json", json.dumps(found, indent=1, ensure_ascii=False) + "\n")
-    write_report(out)
+    if report:
+        write_report(out)
 
 
 def augmented_fibre(o: Outcome) -> Fibre:

@@ -42,6 +42,7 @@ def diagnose_bags(
     model: str | None = None,
     method: str | None = None,
     options: Options | None = None,
+    report: bool = True,
 ) -> dict[str, Any]:
     """Diagnose the trials of some bags and write what was found.
 
@@ -53,6 +54,7 @@ def diagnose_bags(
         seed: of the bootstrap.
         model, method: of the fibre file; its own where None.
         options: where work is done; finished work is kept in `out`.
+        report: write the page as well.
 
     Returns:
         what `diagnosis.json` holds.
@@ -68,7 +70,7 @@ def diagnose_bags(
     options = replace(options, journal=options.journal or out / "journal.jsonl")
     outcome = diagnose(trials, fibre, QUICK if quick else Effort(), seed, options)
     found = as_json(outcome, quick)
-    write(out, outcome, found)
+    write(out, outcome, found, report)
     return found
 
 

@@ -46,7 +46,7 @@ class Effort:
     closure: int = 2
 
 
-QUICK = Effort(steps=2, candidates=5, most=12, folds=3, rivals=2, draws=200, closure=1)
+QUICK = Effort(steps=2, candidates=5, most=12, folds=3, rivals=2, draws=400, closure=1)
 
 
 @dataclass

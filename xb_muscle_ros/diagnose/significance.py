@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,8 @@ _SIGMAS = 3.0
 # Numbers held at a time.
 _AT_ONCE = 3_000_000
 _LEAST_F0 = 1e-12
+# With fewer cells than this none can be called quiet.
+_FEW = 6
 
 
 @dataclass(frozen=True)
@@ -120,7 +122,7 @@ def significance(
         residuals: of all trials, after the fit.
         fit: its normal equations, samples in the order of the residuals.
         noise: of the trials; others may be among them.
-        draws: of noise; no p-value is below 1/(draws + 1).
+        draws: of noise; no p-value is below 2/(draws + 1).
         seed: of the draws.
         floor_f0: the practical floor, F0.
 
@@ -129,13 +131,18 @@ def significance(
     """
     cells = cut(residuals)
     values = np.concatenate([r.value_f0 for r in residuals])[:, None]
+    sharp = sharpened(residuals, fit, noise)
+    # What the fit would have left, had it known that there is only noise.
+    gained = sharp.slopes.T @ ((sharp.weights**2 - fit.weights**2)[:, None] * values)
+    tested = values - sharp.slopes @ sharp.solved(gained)
     null, whole = [], []
-    for drawn in null_residuals(residuals, fit, noise, draws, seed):
+    for drawn in null_residuals(residuals, sharp, noise, draws, seed):
         null.append(rms(cells, drawn))
         whole.append(np.sqrt(np.mean(drawn**2, axis=0)))
     of_cells, of_whole = np.concatenate(null, axis=1), np.concatenate(whole)
     found, overall = rms(cells, values)[:, 0], float(np.sqrt(np.mean(values**2)))
-    p = step_down(np.append(found, overall), np.vstack([of_cells, of_whole]))
+    size = np.append(rms(cells, tested)[:, 0], np.sqrt(np.mean(tested**2)))
+    p = family_wise(size, np.vstack([of_cells, of_whole]))
     return Significance(
         residuals=tuple(residuals),
         cells=cells,
@@ -159,8 +166,7 @@ def null_residuals(
         UserError: see `significance`.
     """
     sizes = [r.time_s.size for r in residuals]
-    if sum(sizes) != fit.slopes.shape[0]:
-        raise UserError(f"residuals have {sum(sizes)} samples, the fit's slopes {fit.slopes.shape[0]}; give the same")
+    _check_samples(residuals, fit)
     if draws < 20:
         raise UserError(f"{draws} draws of noise; at least 20 are needed")
     chosen = noise.of([r.trial for r in residuals])
@@ -169,20 +175,67 @@ def null_residuals(
         yield fit.left(chosen.draw(sizes, part.size, random)) + fit.pulled(part.size, random)
 
 
-def step_down(found: Array, null: Array) -> Array:
-    """Family-wise p-values of sizes, shape (n,).
+def sharpened(residuals: Sequence[Residual], fit: LinearFit, noise: NoiseModel) -> LinearFit:
+    """The fit with weights as the noise alone would have given them, where its own are lower.
 
-    Sizes are compared on a logarithmic scale in standard deviations of their own null, so that a noisy cell does not
-    hide the others.
+    A mismatch makes a fit trust its data less, so that its priors pull more; they would not if there were only noise.
+
+    Raises:
+        UserError: see `significance`.
+    """
+    _check_samples(residuals, fit)
+    variances = []
+    for r, of_trial in zip(residuals, noise.of([r.trial for r in residuals]).trials, strict=True):
+        n = r.time_s.size
+        gamma = of_trial.autocovariance(n)
+        # Variance of a mean times samples: as if that many told as much as one independent one.
+        counted = float(2.0 * (1.0 - np.arange(n) / n) @ gamma - gamma[0])
+        variances.append(np.full(n, max(counted, float(gamma[0]))))
+    weighted = fit.weights**2 * np.concatenate(variances)
+    used = weighted[fit.weights > 0.0]
+    factor = 1.0 / math.sqrt(float(np.mean(used))) if used.size else 1.0
+    return replace(fit, weights=fit.weights * max(factor, 1.0))
+
+
+def _check_samples(residuals: Sequence[Residual], fit: LinearFit) -> None:
+    samples = sum(r.time_s.size for r in residuals)
+    if samples != fit.slopes.shape[0]:
+        raise UserError(f"residuals have {samples} samples, the fit's slopes {fit.slopes.shape[0]}; give the same")
+
+
+def family_wise(found: Array, null: Array) -> Array:
+    """P-values of the sizes in cells and, last, of the whole, shape (cells + 1,).
+
+    Sizes as they are tell of a mismatch that is everywhere; sizes against that of the quieter cells of the same draw
+    tell of one that is somewhere, however little is known of the size of noise. Each p-value is twice the lesser.
 
     Args:
-        found: shape (n,), not negative.
+        found: shape (cells + 1,), F0.
+        null: shape (cells + 1, draws), F0.
+    """
+    log_null, log_found = np.log(np.maximum(null, _LEAST_F0)), np.log(np.maximum(found, _LEAST_F0))
+    plain = step_down(log_found, log_null)
+    if found.size < _FEW:
+        return plain
+    centre = np.mean(log_null, axis=1)
+    quiet_null = np.quantile(log_null[:-1] - centre[:-1, None], 0.25, axis=0)
+    quiet = float(np.quantile(log_found[:-1] - centre[:-1], 0.25))
+    p: Array = np.minimum(2.0 * np.minimum(plain, step_down(log_found - quiet, log_null - quiet_null)), 1.0)
+    return p
+
+
+def step_down(found: Array, null: Array) -> Array:
+    """Family-wise p-values, shape (n,).
+
+    Compared in standard deviations of each one's own null, so that a noisy cell does not hide the others.
+
+    Args:
+        found: shape (n,), any size that grows with the mismatch.
         null: shape (n, draws).
     """
-    log = np.log(np.maximum(null, _LEAST_F0))
-    centre, sd = np.mean(log, axis=1), np.maximum(np.std(log, axis=1), 1e-6)
-    drawn = (log - centre[:, None]) / sd[:, None]
-    size = (np.log(np.maximum(found, _LEAST_F0)) - centre) / sd
+    centre, sd = np.mean(null, axis=1), np.maximum(np.std(null, axis=1), 1e-6)
+    drawn = (null - centre[:, None]) / sd[:, None]
+    size = (found - centre) / sd
     order = np.argsort(-size)
     # The largest of those that have not stood out more.
     largest = np.maximum.accumulate(drawn[order][::-1], axis=0)[::-1]

@@ -107,7 +107,7 @@ class Study:
         return Correction(
             at=np.zeros(coordinates),
             force=self.closure_f0,
-            force_slopes={name: np.zeros((force.size, coordinates)) for name, force in self.closure_f0.items()},
+            force_slopes={},
             features=np.empty(0),
             feature_slopes=np.empty((0, coordinates)),
         )

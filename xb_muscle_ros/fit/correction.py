@@ -25,7 +25,8 @@ class Correction:
     Attributes:
         at: the point, on the moved scale, shape (coordinates,).
         force: difference of the fibre's force at a trial's samples by the trial's name, F0, shape (samples,).
-        force_slopes: its derivatives by the coordinates, shape (samples, coordinates).
+        force_slopes: its derivatives by the coordinates, shape (samples, coordinates); trials that have none here are
+            corrected alike at every point.
         features: difference of each training feature in its standard deviations, shape (features,).
         feature_slopes: its derivatives, shape (features, coordinates).
     """
@@ -42,7 +43,8 @@ class Correction:
         Raises:
             KeyError: the trial has no correction; held-out ones have none.
         """
-        added: Array = self.force[name] + self.force_slopes[name] @ (z - self.at)
+        slopes = self.force_slopes.get(name)
+        added: Array = self.force[name] if slopes is None else self.force[name] + slopes @ (z - self.at)
         return added
 
     def of_features(self, z: Array) -> Array:
