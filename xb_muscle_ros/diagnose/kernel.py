@@ -79,11 +79,7 @@ class Law(NamedTuple):
 
 
 def memories(time_s: Array, length_l0: Array, tau_s: Array) -> Array:
-<<<<<<< HEAD
-    """X' = v - x/τ from rest at the first sample, exact for length that is straight between samples.
-=======
     """Memories x' = v - x/τ from rest at the first sample, exact for length that is straight between samples.
->>>>>>> 60d30634cf4bbdced6c4c7fcb5938d9338ac5d2e
 
     Args:
         time_s, length_l0: shape (n,), s and L0.
