@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from xb_muscle_ros import __version__
 from xb_muscle_ros.errors import UserError
 
-COMMANDS = ("demo", "import", "simulate", "replay", "evaluate", "fit", "loop", "bench", "parameters")
+COMMANDS = ("demo", "import", "simulate", "replay", "evaluate", "fit", "loop", "prove", "bench", "parameters")
 
 
 def parser() -> argparse.ArgumentParser:
