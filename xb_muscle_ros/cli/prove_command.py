@@ -26,9 +26,7 @@ def add(subparsers: Subparsers) -> None:
     make.add_argument("--cases", type=int, required=True, metavar="N", help="how many")
     make.add_argument("--seed", type=int, required=True, metavar="S", help="decides everything: keep it as the key")
     make.add_argument("--key", type=Path, required=True, metavar="FILE", help="file for the truths, outside of DIR")
-    make.add_argument(
-        "--method", default="gaussian", help="method that the fibre files name (default: gaussian)"
-    )
+    make.add_argument("--method", default="gaussian", help="method that the fibre files name (default: gaussian)")
     add_work(make)
     make.set_defaults(run=_make)
     run = steps.add_parser("run", help="diagnose every case, without the key")

@@ -67,7 +67,11 @@ def _diagnose(task: Mapping[str, Any]) -> dict[str, JsonValue]:
     start = time.perf_counter()
     try:
         found = diagnose_bags(
-            find_bags([folder / "bags"]), folder / "fibre.yaml", Path(task["out"]), bool(task["quick"]), int(task["seed"])
+            find_bags([folder / "bags"]),
+            folder / "fibre.yaml",
+            Path(task["out"]),
+            bool(task["quick"]),
+            int(task["seed"]),
         )
     except UserError as error:
         return {"error": str(error), "seconds": time.perf_counter() - start}

@@ -141,14 +141,25 @@ def _spread(truth: Truth, scale: float, shape: Shape) -> Truth:
 
 
 def _compliance(truth: Truth, scale: float, shape: Shape) -> Truth:
-    return truth.changed(
-        {At.SERIES: float(Series.QUADRATIC), At.SERIES_LENGTH: scale, At.SERIES_FORCE: shape["force"]}
-    )
+    return truth.changed({At.SERIES: float(Series.QUADRATIC), At.SERIES_LENGTH: scale, At.SERIES_FORCE: shape["force"]})
+
+
+def _cooperative(truth: Truth, scale: float, shape: Shape) -> Truth:
+    # What heads do for each other's sites, sites need not do among themselves.
+    return truth.changed({At.AFFINITY: scale, At.N: truth.world.values["n"] / (1.0 + 1.5 * scale)})
 
 
 def _regulated(truth: Truth, scale: float, shape: Shape) -> Truth:
+    # As many heads at full activation as before, or the fibre would be too weak to be kept.
+    recruiting = 6.17 * (1.0 + shape["JF"] * 0.4 / (1.0 + 0.4 / shape["half_force"]))
     return truth.changed(
-        {At.THICK: float(Thick.FORCE_DEPENDENT), At.J2: scale, At.JF: shape["JF"], At.J_SATURATION: shape["half_force"]}
+        {
+            At.F: truth.world.values["f"] * (1.0 + scale / recruiting),
+            At.THICK: float(Thick.FORCE_DEPENDENT),
+            At.J2: scale,
+            At.JF: shape["JF"],
+            At.J_SATURATION: shape["half_force"],
+        }
     )
 
 
@@ -248,12 +259,12 @@ _ROWS = (
         ("3state_coop_rigid", "2state_coop_rigid"), 1.0, 8.0, _between(force=(0.1, 0.4)), _compliance,
     ),
     Effect(
-        Name.THIN_FILAMENT_COOPERATIVITY.value, "affinity per bound head, decades", ("2state",), 0.2, 4.0, _none,
-        _set(At.AFFINITY),
+        Name.THIN_FILAMENT_COOPERATIVITY.value, "affinity per bound head, decades", ("2state",), 0.5, 3.0, _none,
+        _cooperative,
     ),
     Effect(
         Name.THICK_FILAMENT_COOPERATIVITY.value, "J2, 1/s", ("2state_coop",), 40.0, 600.0,
-        _between(JF=(50.0, 300.0), half_force=(0.3, 1.0)), _regulated,
+        _between(JF=(100.0, 500.0), half_force=(0.4, 1.2)), _regulated,
     ),
     Effect(Name.TEMPERATURE.value, "change, °C", ("3state_coop", "2state_coop"), 4.0, 10.0, _between(sign=(-1.0, 1.0)), _warm),
     Effect(

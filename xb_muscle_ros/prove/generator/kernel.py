@@ -36,6 +36,9 @@ _THIN, _THICK, _SERIES = int(At.THIN), int(At.THICK), int(At.SERIES)
 _SIGMOID, _REGULATED = int(Thin.SIGMOID), int(Thick.FORCE_DEPENDENT)
 _EXPONENTIAL, _RIGID = int(Series.EXPONENTIAL), int(Series.RIGID)
 
+# Bound heads at which affinity is as the constants say.
+_USUAL_Q0 = 0.2
+
 # Rows of a half-sarcomere's state.
 N_ON, DRX, TORN, LENGTH, OFFSET, WEAK_SITES, WEAK_FORCE, Q0, FORCE, LAST_MOVE = range(10)
 ROWS = 10
@@ -98,7 +101,7 @@ def _series_slope(tension: float, p: Array) -> float:
 def _thin(n_on: float, q0: float, calcium: float, switch_off: float, h: float, p: Array) -> float:
     """Active sites after h, with bound heads held."""
     if p[_THIN] == _SIGMOID:
-        felt = calcium * 10.0 ** (p[_AFFINITY] * q0)
+        felt = calcium * 10.0 ** (p[_AFFINITY] * (q0 - _USUAL_Q0))
         target = 1.0 / (1.0 + (p[_KAPPA] / felt) ** p[_N])
         target /= 1.0 + (switch_off - 1.0) * (1.0 - target)
         # Neighbours that hold each other are slow where about half of them are on.

@@ -70,7 +70,7 @@ class Prior(NamedTuple):
 
 PRIORS: Mapping[str, Prior] = MappingProxyType(
     {
-        Name.PCA_SHIFT.value: Prior(0.05, 1.6, 4.0),
+        Name.PCA_SHIFT.value: Prior(0.05, 1.2, 3.0),
         Name.RUN_DOWN.value: Prior(0.01, 1.5, 5.0),
         Name.FORCE_OFFSET.value: Prior(0.005, 2.0, 6.0),
         Name.FORCE_DRIFT.value: Prior(0.002, 3.0, 12.0),

@@ -13,12 +13,14 @@ from xb_muscle_ros.prove.generator.world import Mesh, Stimulus, World
 
 Array = npt.NDArray[np.float64]
 
-_FITTED = ("f", "k11", "k21", "k22", "kon", "koop", "JF", "kappa", "n", "kse", "kse0", "kpe")
+_FITTED = ("f", "k11", "k21", "k22", "kon", "koop", "JF", "kappa", "n", "kse", "kse0")
 _STEP = 0.02
+_SWEEPS = 10
 # The fit's samples are worth as many independent ones of this SD (F0), against priors of SD 1 on log-parameters.
 _WORTH = 50.0
 _WORTH_SD = 0.01
-_FPE0_SD = 0.02
+# The parallel spring is fitted by its values: it may be next to nothing.
+_PARALLEL_SD = {"kpe": 0.003, "Fpe0": 0.02}
 # Fits want differences, not values: steps of 0.5 ms are good to 0.002 % of F0.
 _COARSE = Mesh(steps=2)
 
@@ -41,7 +43,7 @@ class Refit:
     """Fits of one plain base to studies of one plan; the Jacobian is taken once, at the true constants.
 
     Attributes:
-        names: of the constants that are fitted by their logarithms; Fpe0 is fitted as well.
+        names: of the constants that are fitted by their logarithms; kpe and Fpe0 are fitted as well.
         jacobian: (samples of all trials, fitted constants), F0.
     """
 
@@ -54,14 +56,9 @@ class Refit:
         """
         self._base, self._study = base, list(study)
         self.names = tuple(name for name in _FITTED if name in base.values)
-        self._at = np.zeros(len(self.names) + 1)
+        self._at = np.zeros(len(self.names) + len(_PARALLEL_SD))
         self._plain = np.concatenate(self._forces(self._at))
-        columns = []
-        for i in range(self._at.size):
-            moved = self._at.copy()
-            moved[i] = _STEP
-            columns.append((np.concatenate(self._forces(moved)) - self._plain) / _STEP)
-        self.jacobian = np.column_stack(columns)
+        self.jacobian = self._jacobian_at(self._at, self._plain)
         n = self._plain.size
         self._weight = np.sqrt(_WORTH / n) / _WORTH_SD
 
@@ -72,53 +69,69 @@ class Refit:
     def left_at_once(self, forces: Sequence[Array]) -> float:
         """RMS left of data by a linear fit, F0."""
         r = np.concatenate(list(forces)) - self._plain
-        step = self._solve(self.jacobian, r, self._at)
-        return float(np.sqrt(np.mean((r - self.jacobian @ step) ** 2)))
+        return float(np.sqrt(np.mean((r - self.jacobian @ self._solve(self.jacobian, r, self._at)) ** 2)))
 
-    def __call__(self, forces: Sequence[Array], sweeps: int = 10) -> Refitted:
-        """Fit data: Gauss–Newton steps with a Jacobian that learns from each step (Broyden), halved where need be."""
+    def __call__(self, forces: Sequence[Array], thorough: bool = False) -> Refitted:
+        """Fit data.
+
+        Args:
+            forces: of every trial, F0.
+            thorough: take the Jacobian anew where the first descent ended, and go on from there.
+        """
         data = np.concatenate(list(forces))
-        at, jacobian = self._at.copy(), self.jacobian.copy()
-        model = self._plain
+        at, model = self._descend(data, self._at, self._plain, self.jacobian)
+        if thorough:
+            at, model = self._descend(data, at, model, self._jacobian_at(at, model))
+        left = data - model
+        return Refitted(float(np.sqrt(np.mean(left**2))), self._split(left), self._values(at))
+
+    def _descend(self, data: Array, at: Array, model: Array, jacobian: Array) -> tuple[Array, Array]:
+        """Gauss–Newton steps with a Jacobian that learns from each of them (Broyden), shortened where need be."""
         cost = self._cost(data - model, at)
-        for _ in range(sweeps):
+        for _ in range(_SWEEPS):
             step = self._solve(jacobian, data - model, at)
-            taken = False
+            step = step / max(1.0, float(np.max(np.abs(step))))
             for _ in range(4):
                 trial = np.concatenate(self._forces(at + step))
                 found = self._cost(data - trial, at + step)
-                # Secant update: the matrix maps the step taken to the change that was seen.
-                seen = trial - model - jacobian @ step
-                jacobian = jacobian + np.outer(seen, step) / (step @ step)
+                # The matrix learns to map the step taken to the change that was seen.
+                jacobian = jacobian + np.outer(trial - model - jacobian @ step, step) / (step @ step)
                 if found < cost:
-                    taken = True
                     break
                 step = 0.35 * step
-            if not taken:
+            else:
                 break
             gain = cost - found
             at, model, cost = at + step, trial, found
             if gain < 0.01 * cost:
                 break
-        left = data - model
-        return Refitted(float(np.sqrt(np.mean(left**2))), self._split(left), self._values(at))
+        return at, model
+
+    def _jacobian_at(self, at: Array, model: Array) -> Array:
+        columns = []
+        for i in range(at.size):
+            moved = at.copy()
+            moved[i] += _STEP
+            columns.append((np.concatenate(self._forces(moved)) - model) / _STEP)
+        return np.column_stack(columns)
 
     def _cost(self, r: Array, at: Array) -> float:
         return float(self._weight**2 * np.sum(r**2) + np.sum(at**2))
 
     def _solve(self, jacobian: Array, r: Array, at: Array) -> Array:
-        """Step of the penalised least squares; log-parameters move by no more than 1 at once."""
+        """Step of the penalised least squares."""
         a = np.vstack([self._weight * jacobian, np.eye(at.size)])
         b = np.concatenate([self._weight * r, -at])
         step: Array = np.linalg.lstsq(a, b, rcond=None)[0]
-        return step / max(1.0, float(np.max(np.abs(step))))
+        return step
 
     def _values(self, at: Array) -> dict[str, float]:
         values = {
-            name: float(self._base.values[name] * np.exp(change))
-            for name, change in zip(self.names, at[:-1], strict=True)
+            name: float(self._base.values[name] * np.exp(change)) for name, change in zip(self.names, at, strict=False)
         }
-        return {**values, "Fpe0": float(self._base.values["Fpe0"] + _FPE0_SD * at[-1])}
+        for (name, sd), change in zip(_PARALLEL_SD.items(), at[len(self.names) :], strict=True):
+            values[name] = float(self._base.values[name] + sd * change)
+        return values
 
     def _forces(self, at: Array) -> list[Array]:
         return study_forces(Truth(self._base.with_values(self._values(at))), self._study, _COARSE)

@@ -187,9 +187,7 @@ def _settled(world: World, stimulus: Stimulus, row: Array, mesh: Mesh, p: Array)
     """Isometric at the first sample's length until force stands still."""
     strength = np.asarray(world.strength, dtype=np.float64)
     count = strength.size
-    state = _State(
-        np.zeros((count, mesh.bins)), np.zeros((count, kernel.ROWS)), np.zeros(kernel.SHARED), strength
-    )
+    state = _State(np.zeros((count, mesh.bins)), np.zeros((count, kernel.ROWS)), np.zeros(kernel.SHARED), strength)
     for m in range(count):
         kernel.level(float(row[0]), mesh.first, mesh.dx, mesh.bins, p, state.units[m], state.n[m])
     force, stiffness = float(np.mean(state.units[:, kernel.FORCE])), p[At.UNIT_STIFFNESS]
