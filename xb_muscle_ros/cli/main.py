@@ -11,7 +11,19 @@ from collections.abc import Sequence
 from xb_muscle_ros import __version__
 from xb_muscle_ros.errors import UserError
 
-COMMANDS = ("demo", "import", "simulate", "replay", "evaluate", "fit", "diagnose", "loop", "bench", "parameters")
+COMMANDS = (
+    "demo",
+    "import",
+    "simulate",
+    "replay",
+    "evaluate",
+    "fit",
+    "diagnose",
+    "prove",
+    "loop",
+    "bench",
+    "parameters",
+)
 
 
 def parser() -> argparse.ArgumentParser:

@@ -1,0 +1,82 @@
+"""Springs and dampers beside the heads: force in F0 from length, velocity and calcium alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.prove.generator.world import SAMPLE_S, Stimulus
+
+Array = npt.NDArray[np.float64]
+
+
+def velocity(length: Array) -> Array:
+    """Velocity in the interval that ends at each sample, L0/s, shape (n,); 0 at the first."""
+    return np.diff(length, prepend=length[0]) / SAMPLE_S
+
+
+def saturating_drag(length: Array, drag_s: float, bend: float) -> Array:
+    """Drag that bends over: drag_s v/(1 + |v|/bend), bend in L0/s."""
+    v = velocity(length)
+    return drag_s * v / (1.0 + np.abs(v) / bend)
+
+
+def leaky(drive: Array, tau_s: float) -> Array:
+    """X' = drive - x/tau from 0, exact for a drive that is constant between samples; shape (n,)."""
+    from scipy.signal import lfilter
+
+    left = np.exp(-SAMPLE_S / tau_s)
+    driven = drive.copy()
+    driven[0] = 0.0
+    return np.asarray(lfilter([tau_s * (1.0 - left)], [1.0, -left], driven))
+
+
+def power_law_relaxation(length: Array, stiffness: float, exponent: float, steepness: float) -> Array:
+    """Four Maxwell arms whose springs stiffen exponentially; weights fall with the power `exponent` of their time.
+
+    Args:
+        stiffness: of all arms together at a sudden small stretch, F0/L0.
+        steepness: of the springs, 1/L0.
+    """
+    times = np.array([0.01, 0.06, 0.4, 2.5])
+    weights = times**-exponent / np.sum(times**-exponent)
+    v = velocity(length)
+    total = np.zeros(length.size)
+    for tau, weight in zip(times, weights, strict=True):
+        total += weight * np.expm1(steepness * leaky(v, tau)) / steepness
+    return stiffness * total
+
+
+def calcium_share(calcium_um: float, half_pca: float, steepness: float) -> float:
+    """Share of sites on titin that calcium occupies."""
+    return float(1.0 / (1.0 + (10.0 ** (6.0 - half_pca) / calcium_um) ** steepness))
+
+
+def bound_titin(length: Array, share: float, stiffness: float, contour: float, rebind_s: float) -> Array:
+    """Titin bound to actin where it was when the fibre was activated: a worm-like chain from there on.
+
+    Shortening leaves it slack, and it binds anew, shorter, with the time constant `rebind_s`.
+
+    Args:
+        share: of molecules bound.
+        stiffness: F0/L0 at small extension.
+        contour: extension at which the chain is straight, L0.
+    """
+    anchor, force = length[0], np.zeros(length.size)
+    left = np.exp(-SAMPLE_S / rebind_s)
+    for k in range(length.size):
+        if length[k] < anchor:
+            anchor = length[k] + (anchor - length[k]) * left
+        y = min(max(length[k] - anchor, 0.0) / contour, 0.95)
+        force[k] = (0.25 / (1.0 - y) ** 2 - 0.25 + y) / 1.5 * contour
+    return share * stiffness * force
+
+
+def stiffened_titin(length: Array, share: float, stiffness: float, steepness: float) -> Array:
+    """Exponential spring from rest length on, stiffer by the share of calcium that is bound."""
+    return share * stiffness * np.expm1(steepness * np.maximum(length, 0.0)) / steepness
+
+
+def titin_share(stimulus: Stimulus, shape: dict[str, float]) -> float:
+    """`calcium_share` by an effect's drawn constants."""
+    return calcium_share(stimulus.calcium, shape["half_pca"], shape["hill"])

@@ -1,0 +1,298 @@
+"""What can be concealed: mechanisms, each in another form than the tool has, and effects that no tool knows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.diagnose.names import Name
+from xb_muscle_ros.prove.generator import beside
+from xb_muscle_ros.prove.generator.layout import At, Series, Thick
+from xb_muscle_ros.prove.generator.truth import Truth
+from xb_muscle_ros.prove.generator.world import Acting, Stimulus
+
+Array = npt.NDArray[np.float64]
+Shape = dict[str, float]
+
+_COMPLIANT = ("3state_coop", "2state_coop", "2state")
+_ALL = (*_COMPLIANT, "3state_coop_rigid")
+
+
+class Effect(NamedTuple):
+    """One row of the table.
+
+    Attributes:
+        label: a name of `diagnose.names`, or ``outside:`` and a name.
+        meaning: of the scale, with its unit.
+        models: worlds that can have it, by the name of the model that is given to the tool.
+        start: a usual scale.
+        most: scale beyond which it is no more plausible.
+        draw: the constants that give it its form.
+        apply: the truth with the effect of a scale and form; at scale 0 as it was.
+    """
+
+    label: str
+    meaning: str
+    models: tuple[str, ...]
+    start: float
+    most: float
+    draw: Callable[[np.random.Generator], Shape]
+    apply: Callable[[Truth, float, Shape], Truth]
+
+
+def _none(random: np.random.Generator) -> Shape:
+    return {}
+
+
+def _between(**bounds: tuple[float, float]) -> Callable[[np.random.Generator], Shape]:
+    """Draws each constant evenly on a log scale where its bounds are positive, else evenly."""
+
+    def draw(random: np.random.Generator) -> Shape:
+        return {
+            name: float(np.exp(random.uniform(*np.log([low, high]))) if low > 0.0 else random.uniform(low, high))
+            for name, (low, high) in bounds.items()
+        }
+
+    return draw
+
+
+def _set(place: At, **shaped: At) -> Callable[[Truth, float, Shape], Truth]:
+    """An effect that is an entry of the loop's vector; its form is other entries."""
+
+    def apply(truth: Truth, scale: float, shape: Shape) -> Truth:
+        return truth.changed({place: scale, **{at: shape[name] for name, at in shaped.items()}})
+
+    return apply
+
+
+def _middle(values: Array) -> Array:
+    """Means over sample intervals."""
+    return np.asarray(0.5 * (values[1:] + values[:-1]))
+
+
+def _acting(
+    calcium: Array | None = None, attachment: Array | None = None, switch_off: Array | None = None,
+    recruitment: Array | None = None, n: int = 0,
+) -> Acting:  # fmt: skip
+    plain = Acting.plain(n)
+    return Acting(
+        plain.calcium if calcium is None else calcium,
+        plain.attachment if attachment is None else attachment,
+        plain.switch_off if switch_off is None else switch_off,
+        plain.recruitment if recruitment is None else recruitment,
+    )
+
+
+def _drag(truth: Truth, scale: float, shape: Shape) -> Truth:
+    return truth.adding(lambda s, _: beside.saturating_drag(s.length, scale, shape["bend"]))
+
+
+def _viscoelastic(truth: Truth, scale: float, shape: Shape) -> Truth:
+    return truth.adding(
+        lambda s, _: beside.power_law_relaxation(s.length, scale, shape["exponent"], shape["steepness"])
+    )
+
+
+def _titin(truth: Truth, scale: float, shape: Shape) -> Truth:
+    return truth.adding(
+        lambda s, _: beside.bound_titin(
+            s.length, beside.titin_share(s, shape), scale, shape["contour"], shape["rebind_s"]
+        )
+    )
+
+
+def _stiffened(truth: Truth, scale: float, shape: Shape) -> Truth:
+    return truth.adding(
+        lambda s, _: beside.stiffened_titin(s.length, beside.titin_share(s, shape), scale, shape["steepness"])
+    )
+
+
+def _sensitivity(truth: Truth, scale: float, shape: Shape) -> Truth:
+    def act(study: Sequence[Stimulus], i: int) -> Acting:
+        length = study[i].length
+        return _acting(calcium=10.0 ** (scale * _middle(length)), n=length.size - 1)
+
+    return truth.acting(act)
+
+
+def _recruited(truth: Truth, scale: float, shape: Shape) -> Truth:
+    def act(study: Sequence[Stimulus], i: int) -> Acting:
+        length = np.maximum(study[i].length, 0.0)
+        late = beside.leaky(length, shape["delay_s"]) / shape["delay_s"]
+        more = np.expm1(shape["steepness"] * late) / shape["steepness"]
+        return _acting(recruitment=scale * _middle(more), n=length.size - 1)
+
+    return truth.acting(act)
+
+
+def _draw_spread(random: np.random.Generator) -> Shape:
+    count = int(random.integers(3, 6))
+    z = random.standard_normal(count)
+    z = (z - z.mean()) / z.std()
+    return {f"unit_{m}": float(value) for m, value in enumerate(z)}
+
+
+def _spread(truth: Truth, scale: float, shape: Shape) -> Truth:
+    return truth.changed({At.UNIT_STIFFNESS: 0.1 * scale}, tuple(1.0 + scale * z for z in shape.values()))
+
+
+def _compliance(truth: Truth, scale: float, shape: Shape) -> Truth:
+    return truth.changed({At.SERIES: float(Series.QUADRATIC), At.SERIES_LENGTH: scale, At.SERIES_FORCE: shape["force"]})
+
+
+def _cooperative(truth: Truth, scale: float, shape: Shape) -> Truth:
+    # What heads do for each other's sites, sites need not do among themselves.
+    return truth.changed({At.AFFINITY: scale, At.N: truth.world.values["n"] / (1.0 + 1.5 * scale)})
+
+
+def _regulated(truth: Truth, scale: float, shape: Shape) -> Truth:
+    # As many heads at full activation as before, or the fibre would be too weak to be kept.
+    recruiting = 6.17 * (1.0 + shape["JF"] * 0.4 / (1.0 + 0.4 / shape["half_force"]))
+    return truth.changed(
+        {
+            At.F: truth.world.values["f"] * (1.0 + scale / recruiting),
+            At.THICK: float(Thick.FORCE_DEPENDENT),
+            At.J2: scale,
+            At.JF: shape["JF"],
+            At.J_SATURATION: shape["half_force"],
+        }
+    )
+
+
+# Q10 of the rates: attachment and detachment of heads, both filaments.
+_Q10 = {"f": 2.6, "k11": 2.1, "k21": 2.4, "kon": 1.4, "koff": 2.2, "J1": 4.0, "J2": 1.6, "tau_act": 0.5}
+_USUAL = {"koff": 80.0, "J1": 6.17, "J2": 200.0, "tau_act": 0.005}
+
+
+def _warm(truth: Truth, scale: float, shape: Shape) -> Truth:
+    degrees = scale if shape["sign"] > 0.0 else -scale
+    values = {**_USUAL, **truth.world.values}
+    warm = {name: values[name] * q10 ** (0.1 * degrees) for name, q10 in _Q10.items() if name in values}
+    return Truth(truth.world.with_values(warm), truth.acts, truth.adds)
+
+
+def _inactivated(truth: Truth, scale: float, shape: Shape) -> Truth:
+    def act(study: Sequence[Stimulus], i: int) -> Acting:
+        stretching = np.maximum(beside.velocity(study[i].length), 0.0)
+        lost = beside.leaky(stretching, shape["memory_s"])
+        return _acting(attachment=np.exp(-scale * _middle(lost)), n=lost.size - 1)
+
+    return truth.acting(act)
+
+
+def _switched_off(truth: Truth, scale: float, shape: Shape) -> Truth:
+    def act(study: Sequence[Stimulus], i: int) -> Acting:
+        moving = beside.leaky(np.abs(beside.velocity(study[i].length)), shape["memory_s"]) / shape["memory_s"]
+        return _acting(switch_off=1.0 + scale * _middle(moving), n=moving.size - 1)
+
+    return truth.acting(act)
+
+
+def _buffered(truth: Truth, scale: float, shape: Shape) -> Truth:
+    def act(study: Sequence[Stimulus], i: int) -> Acting:
+        moved = beside.leaky(beside.velocity(study[i].length), shape["memory_s"])
+        return _acting(calcium=np.exp(-scale * _middle(moved)), n=moved.size - 1)
+
+    return truth.acting(act)
+
+
+def _damaged(truth: Truth, scale: float, shape: Shape) -> Truth:
+    def stretched(stimulus: Stimulus) -> Array:
+        # Harm is done by stretch beyond rest, and the more so the more calcium is there.
+        active = stimulus.calcium / (1.0 + stimulus.calcium)
+        longer = np.maximum(np.diff(np.maximum(stimulus.length, 0.0), prepend=stimulus.length[0]), 0.0)
+        return active * np.cumsum(longer)
+
+    def act(study: Sequence[Stimulus], i: int) -> Acting:
+        before = sum(float(stretched(earlier)[-1]) for earlier in study[:i])
+        return _acting(attachment=np.exp(-scale * (before + _middle(stretched(study[i])))), n=study[i].length.size - 1)
+
+    return truth.acting(act)
+
+
+_TITIN = {"half_pca": (6.0, 6.4), "hill": (2.0, 4.0)}
+_ROWS = (
+    Effect(Name.VISCOUS_DRAG.value, "drag at low speed, s", _ALL, 0.01, 0.1, _between(bend=(0.3, 2.0)), _drag),
+    Effect(
+        Name.PASSIVE_VISCOELASTICITY.value, "stiffness, F0/L0", _ALL, 1.0, 15.0,
+        _between(exponent=(0.1, 0.4), steepness=(10.0, 30.0)), _viscoelastic,
+    ),
+    Effect(
+        Name.WEAKLY_BOUND_HEADS.value, "stiffness, cross-bridge force per power stroke", _ALL, 0.05, 0.5,
+        _between(rate=(100.0, 2000.0), strain=(2.0, 6.0), lag=(0.005, 0.02)),
+        _set(At.WEAK_STIFFNESS, rate=At.WEAK_RATE, strain=At.WEAK_STRAIN, lag=At.WEAK_LAG),
+    ),
+    Effect(
+        Name.ACTIVE_TITIN.value, "stiffness when bound, F0/L0", _ALL, 2.0, 20.0,
+        _between(contour=(0.12, 0.25), rebind_s=(0.03, 0.3), **_TITIN), _titin,
+    ),
+    Effect(
+        Name.STATIC_CALCIUM_STIFFNESS.value, "stiffness, F0/L0", _ALL, 2.0, 20.0,
+        _between(steepness=(5.0, 20.0), **_TITIN), _stiffened,
+    ),
+    Effect(Name.LENGTH_DEPENDENT_ACTIVATION.value, "pCa50 per length, 1/L0", _ALL, 1.5, 12.0, _none, _sensitivity),
+    Effect(
+        Name.LATTICE_SPACING.value, "attachment per length at rest, 1/L0", _ALL, 2.0, 12.0, _between(best=(0.85, 0.95)),
+        _set(At.LATTICE_SLOPE, best=At.LATTICE_BEST),
+    ),
+    Effect(
+        Name.FILAMENT_OVERLAP.value, "loss of overlap per length beyond the edge, 1/L0", _ALL, 1.5, 8.0,
+        _between(edge=(-0.03, 0.0)), _set(At.OVERLAP_SLOPE, edge=At.OVERLAP_EDGE),
+    ),
+    Effect(
+        Name.STRAIN_RECRUITED_HEADS.value, "J1's factor per length, 1/L0", ("3state_coop", "3state_coop_rigid"), 100.0,
+        5000.0, _between(steepness=(5.0, 25.0), delay_s=(0.003, 0.02)), _recruited,
+    ),
+    Effect(
+        Name.FORCIBLE_DETACHMENT.value, "rate of tearing off, 1/s", ("3state_coop", "2state_coop", "3state_coop_rigid"),
+        500.0, 6000.0, _between(strain=(1.0, 3.0), steepness=(4.0, 10.0), rebind=(500.0, 3000.0)),
+        _set(At.TEAR_RATE, strain=At.TEAR_STRAIN, steepness=At.TEAR_STEEPNESS, rebind=At.REBIND_RATE),
+    ),
+    Effect(Name.NONLINEAR_CROSSBRIDGE.value, "curvature, 1", _ALL, 0.1, 0.8, _none, _set(At.HEAD_CURVATURE)),
+    Effect(Name.HALF_SARCOMERE_SPREAD.value, "SD of strength, 1", _COMPLIANT, 0.05, 0.2, _draw_spread, _spread),
+    Effect(
+        Name.SERIES_COMPLIANCE.value, "length scale of the spring, power strokes",
+        ("3state_coop_rigid", "2state_coop_rigid"), 1.0, 8.0, _between(force=(0.1, 0.4)), _compliance,
+    ),
+    Effect(
+        Name.THIN_FILAMENT_COOPERATIVITY.value, "affinity per bound head, decades", ("2state",), 0.5, 3.0, _none,
+        _cooperative,
+    ),
+    Effect(
+        Name.THICK_FILAMENT_COOPERATIVITY.value, "J2, 1/s", ("2state_coop",), 40.0, 600.0,
+        _between(JF=(100.0, 500.0), half_force=(0.4, 1.2)), _regulated,
+    ),
+    Effect(Name.TEMPERATURE.value, "change, °C", ("3state_coop", "2state_coop"), 4.0, 10.0, _between(sign=(-1.0, 1.0)), _warm),
+    Effect(
+        Name.PHOSPHATE.value, "detachment before the stroke, 1/s", ("3state_coop", "2state_coop"), 30.0, 400.0, _none,
+        _set(At.PHOSPHATE_RATE),
+    ),
+)  # fmt: skip
+_OUTSIDE = (
+    Effect(
+        "outside:inactivation_after_stretch", "attachment lost per stretch, 1/L0", _ALL, 2.0, 20.0,
+        _between(memory_s=(1.0, 2.0)), _inactivated,
+    ),
+    Effect(
+        "outside:movement_switches_off", "rise of koff per speed, s/L0", _COMPLIANT, 1.0, 60.0,
+        _between(memory_s=(0.03, 0.08)), _switched_off,
+    ),
+    Effect(
+        "outside:calcium_after_movement", "calcium lost per stretch, 1/L0", _ALL, 3.0, 30.0,
+        _between(memory_s=(0.2, 0.8)), _buffered,
+    ),
+    Effect(
+        "outside:series_creep", "creep per force, power strokes", _COMPLIANT, 6.0, 15.0, _between(tau_s=(0.4, 2.0)),
+        _set(At.CREEP, tau_s=At.CREEP_TIME),
+    ),
+    Effect("outside:damage_by_stretch", "heads lost per stretch, 1/L0", _ALL, 0.5, 8.0, _none, _damaged),
+)  # fmt: skip
+
+EFFECTS: Mapping[str, Effect] = MappingProxyType({row.label: row for row in (*_ROWS, *_OUTSIDE)})
+"""All effects by label."""
+OUTSIDE: tuple[str, ...] = tuple(row.label for row in _OUTSIDE)
+"""Effects that no mechanism of the tool describes."""

@@ -1,0 +1,97 @@
+"""A benchmark made: bags and a fibre file for each case, and a key that nobody opens before the scoring."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.files import write_text
+from xb_muscle_ros.prove.sealing import BENCHMARK, digest, load_benchmark
+from xb_muscle_ros.work import JsonValue, Options, stream
+
+VERSION = 1
+_ABOUT = (
+    "Studies of made fibres, each with its bags and a fibre file that was fitted to another fibre. In some something "
+    "is concealed: a mechanism, an effect that has no name, or a fault of the measurement; in some nothing. "
+    "The key was sealed when the cases were made: its SHA-256 is below."
+)
+
+
+def case_name(number: int) -> str:
+    """Name of a case's folder; numbers begin at 1."""
+    return f"case_{number:04d}"
+
+
+def make(out: Path, cases: int, seed: int, key: Path, method: str, options: Options) -> str:
+    """Make a benchmark; a run that was stopped goes on where it was.
+
+    Args:
+        out: folder; gets ``cases/`` and ``benchmark.json``.
+        cases: how many.
+        seed: decides everything; who knows it knows the key.
+        key: file for the truths; must not lie in `out`.
+        method: how the fibre files say that heads are distributed over strain.
+        options: where to work; the journal is kept beside the key until all is done.
+
+    Returns:
+        SHA-256 of the key file.
+
+    Raises:
+        UserError: the folder holds another benchmark, the key lies in it, or a file cannot be written.
+    """
+    if out.resolve() in key.resolve().parents:
+        raise UserError(f"key {key} lies within {out}, where the tool would find it; choose a file elsewhere")
+    if (out / BENCHMARK).exists():
+        return _finished(out, cases, seed, key)
+    tasks = [_task(out, number, cases, seed, method) for number in range(1, cases + 1)]
+    found: dict[int, Any] = dict(stream(_make_one, tasks, options))
+    for index, task in enumerate(tasks):
+        # The journal may know a case whose folder was deleted.
+        if not (Path(str(task["out"])) / "fibre.yaml").exists():
+            found[index] = _make_one(task)
+    return seal(out, key, seed, [found[index] for index in range(cases)], _ABOUT, method)
+
+
+def seal(out: Path, key: Path, seed: int, entries: list[Any], about: str, method: str) -> str:
+    """Write the key and the benchmark's public description; returns the key's SHA-256."""
+    salt = hashlib.sha256(f"salt of the key, seed {seed}".encode()).hexdigest()
+    content = {"version": VERSION, "salt": salt, "seed": seed, "cases": entries}
+    write_text(key, json.dumps(content, indent=1) + "\n")
+    sealed = digest(key)
+    public = {
+        "version": VERSION, "about": about, "method": method, "cases": [entry["case"] for entry in entries],
+        "key_sha256": sealed,
+    }  # fmt: skip
+    write_text(out / BENCHMARK, json.dumps(public, indent=1) + "\n")
+    return sealed
+
+
+def _finished(out: Path, cases: int, seed: int, key: Path) -> str:
+    """The hash of a benchmark that is made already, if it is the one asked for."""
+    public = load_benchmark(out)
+    if key.exists() and digest(key) == public["key_sha256"] and len(public["cases"]) == cases:
+        if json.loads(key.read_text(encoding="utf-8"))["seed"] == seed:
+            return str(public["key_sha256"])
+    raise UserError(f"{out} holds another benchmark already; choose another folder or delete it")
+
+
+def _task(out: Path, number: int, cases: int, seed: int, method: str) -> dict[str, JsonValue]:
+    folder = out / "cases" / case_name(number)
+    return {"number": number, "cases": cases, "seed": seed, "method": method, "out": str(folder)}
+
+
+def _make_one(task: Mapping[str, Any]) -> dict[str, JsonValue]:
+    """Make one case, write what is public of it, and return what the key says."""
+    from xb_muscle_ros.prove.generator.case import make_case
+    from xb_muscle_ros.prove.generator.mix import specs
+    from xb_muscle_ros.prove.generator.writing import key_entry, write_case
+
+    number, folder = int(task["number"]), Path(task["out"])
+    spec = specs(int(task["cases"]), int(task["seed"]))[number - 1]
+    case = make_case(spec, int(task["seed"]), number)
+    write_case(folder, case, f"fibre_{number:04d}", str(task["method"]))
+    return key_entry(case, folder.name)

@@ -1,0 +1,94 @@
+"""A benchmark diagnosed: every case by the tool as a user would, never with the key."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.files import write_text
+from xb_muscle_ros.prove.sealing import BENCHMARK, load_benchmark
+from xb_muscle_ros.work import JsonValue, Options, stream
+
+RESULTS = "results.json"
+_JOURNAL = "run.journal"
+
+
+def run(folder: Path, out: Path, quick: bool, seed: int, options: Options) -> dict[str, Any]:
+    """Diagnose all cases; a run that was stopped goes on where it was.
+
+    Args:
+        folder: of the benchmark.
+        out: gets one folder of a diagnosis for each case, ``results.json`` and a copy of ``benchmark.json``.
+        quick: the tool's quick way.
+        seed: of the tool.
+        options: where to work.
+
+    Returns:
+        What ``results.json`` holds: by case, what the scoring needs of its diagnosis.
+
+    Raises:
+        UserError: the folder is no benchmark, or results cannot be written.
+    """
+    benchmark = load_benchmark(folder)
+    tasks = [_task(folder, out, str(name), quick, seed) for name in benchmark["cases"]]
+    found = dict(stream(_diagnose, tasks, replace(options, journal=options.journal or out / _JOURNAL)))
+    results = {"quick": quick, "seed": seed, "cases": {task["case"]: found[i] for i, task in enumerate(tasks)}}
+    write_text(out / RESULTS, json.dumps(results, indent=1) + "\n")
+    write_text(out / BENCHMARK, json.dumps(benchmark, indent=1) + "\n")
+    return results
+
+
+def _task(folder: Path, out: Path, name: str, quick: bool, seed: int) -> dict[str, Any]:
+    case = folder / "cases" / name
+    content = hashlib.sha256()
+    files = sorted(path for path in case.rglob("*") if path.is_file())
+    if not files:
+        raise UserError(f"case {name} is missing in {folder / 'cases'}; make the benchmark again")
+    for path in files:
+        content.update(path.relative_to(case).as_posix().encode() + b"\0" + path.read_bytes())
+    return {
+        "case": name, "folder": str(case), "content": content.hexdigest(), "out": str(out / "cases" / name),
+        "quick": quick, "seed": seed,
+    }  # fmt: skip
+
+
+def _diagnose(task: Mapping[str, Any]) -> dict[str, JsonValue]:
+    """Diagnose one case; a case that the tool cannot do is a result as well."""
+    from xb_muscle_ros.diagnose.run import diagnose_bags
+    from xb_muscle_ros.trials.bags import find_bags
+
+    folder = Path(task["folder"])
+    start = time.perf_counter()
+    try:
+        found = diagnose_bags(
+            find_bags([folder / "bags"]),
+            folder / "fibre.yaml",
+            Path(task["out"]),
+            bool(task["quick"]),
+            int(task["seed"]),
+        )
+    except UserError as error:
+        return {"error": str(error), "seconds": time.perf_counter() - start}
+    return {**needed(found), "seconds": time.perf_counter() - start}
+
+
+def needed(diagnosis: Mapping[str, Any]) -> dict[str, JsonValue]:
+    """What the scoring needs of a ``diagnosis.json``."""
+    mismatch = diagnosis.get("mismatch") or []
+    before, after = (diagnosis.get(when) or {} for when in ("before", "after"))
+    return {
+        "verdict": diagnosis["verdict"],
+        "answer": list(diagnosis.get("answer") or ()),
+        "family": diagnosis.get("family"),
+        "p_value": diagnosis.get("p_value"),
+        "confidence": diagnosis.get("confidence"),
+        "first_mismatch": {key: mismatch[0][key] for key in ("trial", "phase", "size_f0")} if mismatch else None,
+        "before_heldout_f0": before.get("heldout_rmsd_f0"),
+        "after_heldout_f0": after.get("heldout_rmsd_f0"),
+    }
