@@ -1,0 +1,131 @@
+"""The answer that evidence allows, and when there is none: made fits, no simulation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from xb_muscle_ros.diagnose.crossval import HeldOut
+from xb_muscle_ros.diagnose.names import Name, Verdict
+from xb_muscle_ros.diagnose.refit import Fit
+from xb_muscle_ros.diagnose.search import Search
+from xb_muscle_ros.diagnose.study import Explanation
+from xb_muscle_ros.diagnose.verdict import Evidence, decide, weights_against
+
+TRIALS = [f"t{i}" for i in range(7)]
+NOISE = 0.0007
+
+
+def fit(rmsd: float, *names: Name) -> Fit:
+    explanation = Explanation()
+    for name in names:
+        explanation = explanation.plus(name)
+    return Fit(explanation, {}, 4e7 * rmsd**2, rmsd, 1)
+
+
+def scores(rmsd: float) -> HeldOut:
+    return HeldOut(dict.fromkeys(TRIALS, rmsd ** 2), dict.fromkeys(TRIALS, 1000))
+
+
+def evidence(final: Fit, *others: Fit, base: float = 0.006, **changes: Any) -> Evidence:
+    """Evidence in which everything speaks for the final explanation, but for the changes."""
+    bottom = fit(base)
+    fits = {f.explanation.label: f for f in (bottom, *others, final)}
+    study = SimpleNamespace(trials=[SimpleNamespace(name=t) for t in TRIALS])
+    search = Search(study, bottom, final, (), None, fits)  # type: ignore[arg-type]
+    made = Evidence(
+        search=search,
+        start_rmsd_f0=0.05,
+        noise_f0=NOISE,
+        detected=True,
+        p_value=0.004,
+        heldout={"base": scores(1.3 * base), final.explanation.label: scores(1.3 * final.rmsd_f0)},
+        flexible_f0=1.4 * final.rmsd_f0,
+        interval=(0.01, 0.03),
+        at_bound=False,
+        cleaned=0.95,
+    )
+    return replace(made, **changes)
+
+
+DRAG = fit(0.0008, Name.VISCOUS_DRAG)
+
+
+def test_a_mechanism_that_explains_all_is_named() -> None:
+    d = decide(evidence(DRAG, fit(0.004, Name.TIME_SHIFT), fit(0.003, Name.WEAKLY_BOUND_HEADS)))
+    assert d.verdict is Verdict.PHYSICS
+    assert d.answer == (Name.VISCOUS_DRAG,)
+    assert d.family == "parallel_viscoelasticity"
+    assert d.confidence > 0.9
+    assert all(c.passed for c in d.checks)
+
+
+def test_nothing_beyond_noise_is_none_or_parameters() -> None:
+    quiet = evidence(fit(0.0008), base=0.0008, detected=False, p_value=0.4)
+    assert decide(quiet).verdict is Verdict.PARAMETERS
+    assert decide(replace(quiet, start_rmsd_f0=0.0009)).verdict is Verdict.NONE
+    assert decide(quiet).answer == ()
+
+
+def test_a_fault_that_explains_all_is_measurement() -> None:
+    d = decide(evidence(fit(0.0008, Name.TIME_SHIFT), fit(0.004, Name.VISCOUS_DRAG), interval=None))
+    assert d.verdict is Verdict.MEASUREMENT
+    assert d.answer == (Name.TIME_SHIFT,)
+
+
+def test_rivals_of_one_family_leave_the_family() -> None:
+    d = decide(evidence(DRAG, fit(0.00082, Name.PASSIVE_VISCOELASTICITY)))
+    assert d.verdict is Verdict.PHYSICS
+    assert d.answer == (Name.VISCOUS_DRAG, Name.PASSIVE_VISCOELASTICITY)
+    assert d.family == "parallel_viscoelasticity"
+
+
+@pytest.mark.parametrize("rival", [Name.WEAKLY_BOUND_HEADS, Name.TRANSDUCER_LAG])
+def test_rivals_of_another_family_or_kind_leave_it_open(rival: Name) -> None:
+    d = decide(evidence(DRAG, fit(0.00081, rival)))
+    assert d.verdict is Verdict.AMBIGUOUS
+    assert set(d.answer) == {Name.VISCOUS_DRAG, rival}
+    assert d.family is None
+
+
+@pytest.mark.parametrize(
+    "against",
+    [
+        {"p_value": 0.03},
+        {"cleaned": 0.3},
+        {"interval": (-0.01, 0.03)},
+        {"at_bound": True},
+        {"heldout": {}},
+        {"heldout": {"base": scores(0.006), "viscous_drag": scores(0.007)}},
+        {"flexible_f0": 0.0001, "heldout": {"base": scores(0.006), "viscous_drag": scores(0.0045)}},
+        {"described": False},
+    ],
+    ids=lambda a: next(iter(a)),
+)
+def test_no_mechanism_is_named_where_a_condition_fails(against: dict[str, Any]) -> None:
+    d = decide(evidence(DRAG, **against))
+    assert d.verdict is Verdict.UNEXPLAINED
+    assert d.answer == ()
+
+
+def test_half_an_explanation_is_none() -> None:
+    d = decide(evidence(fit(0.0045, Name.VISCOUS_DRAG)))
+    assert d.verdict is Verdict.UNEXPLAINED
+
+
+def test_a_mechanism_that_only_tidies_up_after_a_fault_is_not_named() -> None:
+    shift = fit(0.0012, Name.TIME_SHIFT)
+    final = fit(0.001, Name.NONLINEAR_CROSSBRIDGE, Name.TIME_SHIFT)
+    d = decide(evidence(final, shift, fit(0.0058, Name.NONLINEAR_CROSSBRIDGE)))
+    assert d.verdict is Verdict.MEASUREMENT
+    assert d.answer[0] is Name.TIME_SHIFT
+
+
+def test_weights_are_shares_and_follow_the_fit() -> None:
+    e = evidence(DRAG, fit(0.0009, Name.WEAKLY_BOUND_HEADS), fit(0.003, Name.TIME_SHIFT))
+    weights = weights_against(e.search, Name.VISCOUS_DRAG, 7)
+    assert sum(weights.values()) == pytest.approx(1.0)
+    assert weights[Name.VISCOUS_DRAG] > weights[Name.WEAKLY_BOUND_HEADS] > weights[Name.TIME_SHIFT] > 0.0

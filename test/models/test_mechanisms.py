@@ -1,0 +1,244 @@
+"""Every mechanism beside the families: nothing where its effect is zero, and what it says where it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.composition import Composition
+from xb_muscle_ros.models.fibre_file import Fibre, fibre_from_parameters, load_fibre
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.models.parameters import complete
+from xb_muscle_ros.models.registry import EXTRAS, SWAPS, compose, split_set, with_mechanisms
+
+BASE = "3state_coop"
+TIME = np.arange(501) * 1e-3
+# Stretch, shortening back, stretch, hold: 3.83 % L0 at the paper's speed.
+LENGTH = np.interp(TIME, [0.0, 0.05, 0.134, 0.218, 0.228, 0.312, 0.5], [0.0, 0.0, 0.0383, 0.0, 0.0, 0.0383, 0.0383])
+EFFECT: Mapping[str, Mapping[str, float]] = {
+    "viscous_drag": {"drag": 0.01},
+    "passive_viscoelasticity": {"pv_stiffness": 1.0, "pv_tau": 0.05, "pv_ratio": 0.5},
+    "weakly_bound_heads": {"weak_stiffness": 40.0, "weak_detachment": 500.0},
+    "active_titin": {"titin_stiffness": 2.0, "titin_calcium": 0.5},
+    "static_calcium_stiffness": {"calcium_stiffness": 2.0, "stiffness_calcium": 0.5},
+    "length_dependent_activation": {"calcium_per_length": 2.0},
+    "lattice_spacing": {"attachment_per_length": 2.0},
+    "filament_overlap": {"overlap_per_length": -2.0},
+    "strain_recruited_heads": {"strain_recruitment": 150.0},
+    "nonlinear_crossbridge": {"head_curvature": 0.1},
+    "half_sarcomere_spread": {"hs_spread": 0.1},
+    "temperature": {"warmer": 5.0},
+    "phosphate": {"phosphate_detachment": 5.0},
+}
+
+
+def fibre_with(mechanism: str | None, method: str = "gaussian", base: str = BASE, **values: float) -> Fibre:
+    given = load_fibre("18Dec2017a", base, method)
+    name = with_mechanisms(base, mechanism) if mechanism else base
+    wanted = {row.name for row in compose(name, method).parameters}
+    start = {k: v for k, v in given.values.items() if k in wanted} | {"smoothing": 0.0} | values
+    return replace(given, model=name, values=MappingProxyType(complete(start, name, "test", method)))
+
+
+def force(fibre: Fibre, pca: float = 6.1, length: np.ndarray = LENGTH) -> np.ndarray:
+    muscle = Muscle(fibre)
+    calcium = np.full(TIME.size, 10.0 ** (6.0 - pca))
+    start = muscle.settle(float(length[0]), float(calcium[0]), None if fibre.method == "gaussian" else 10.0)
+    return muscle.outputs_of(muscle.run(start, np.diff(TIME), length, calcium))["force_f0"]
+
+
+@pytest.fixture(scope="module")
+def plain() -> np.ndarray:
+    return force(fibre_with(None))
+
+
+def test_every_mechanism_has_its_case_here() -> None:
+    assert set(EFFECT) == set(EXTRAS)
+
+
+@pytest.mark.parametrize("mechanism", EXTRAS)
+def test_absent_where_its_effect_is_zero_and_felt_where_it_is_not(mechanism: str, plain: np.ndarray) -> None:
+    effect = EFFECT[mechanism]
+    nothing = force(fibre_with(mechanism, **{**effect, next(iter(effect)): 0.0}))
+    # The other half-sarcomere's moments move with the tolerance of a step.
+    np.testing.assert_allclose(nothing, plain, atol=2e-5 if mechanism == "half_sarcomere_spread" else 1e-12)
+    felt = force(fibre_with(mechanism, **effect))
+    assert np.max(np.abs(felt - plain)) > 1e-3
+
+
+@pytest.mark.parametrize("mechanism", EXTRAS)
+def test_states_stay_within_their_bounds_through_fast_movement(mechanism: str) -> None:
+    """One that leaves them would raise; what comes out is finite at any calcium."""
+    length = np.interp(TIME, [0.0, 0.05, 0.07, 0.2, 0.22, 0.5], [0.0, 0.0, 0.06, 0.06, -0.02, -0.02])
+    for pca in (4.5, 6.3, 9.0):
+        assert np.all(np.isfinite(force(fibre_with(mechanism, **EFFECT[mechanism]), pca, length)))
+
+
+@pytest.mark.parametrize(
+    "mechanism", ["nonlinear_crossbridge", "phosphate", "length_dependent_activation", "weakly_bound_heads"]
+)
+def test_does_the_same_to_the_distribution_as_to_its_moments(mechanism: str, plain: np.ndarray) -> None:
+    """By the distribution, the effect is that of the Gaussian form to within what closing the moments costs."""
+    method = "characteristics"
+    moments = force(fibre_with(mechanism, **EFFECT[mechanism])) - plain
+    bins = force(fibre_with(mechanism, method, **EFFECT[mechanism])) - force(fibre_with(None, method))
+    assert np.sqrt(np.mean((bins - moments) ** 2)) < 0.05 * np.sqrt(np.mean(moments**2))
+
+
+def test_half_sarcomeres_bear_one_force_and_share_the_movement() -> None:
+    fibre = fibre_with("half_sarcomere_spread", hs_spread=0.15)
+    muscle = Muscle(fibre)
+    calcium = np.full(TIME.size, 10.0**-0.1)
+    states = muscle.run(muscle.settle(0.0, float(calcium[0])), np.diff(TIME), LENGTH, calcium)
+    column = {name: states[:, i] for i, name in enumerate(muscle.state_names)}
+    tie = fibre.values["hs_stiffness"] * column["hs_difference"] / 2.0
+    strong = 1.15 * (column["q0"] + column["q1"]) + tie
+    weak = 0.85 * (column["other_q0"] + column["other_q1"]) - tie
+    np.testing.assert_allclose(strong, weak, atol=1e-4)
+    # The stronger one shortens at the cost of the weaker one, the more the longer they bear force.
+    assert np.all(column["hs_difference"][60:] < 0.0)
+
+
+def test_drag_is_proportional_to_velocity(plain: np.ndarray) -> None:
+    velocity = np.concatenate([[0.0], np.diff(LENGTH) / np.diff(TIME)])
+    np.testing.assert_allclose(force(fibre_with("viscous_drag", drag=0.02)) - plain, 0.02 * velocity, atol=1e-12)
+
+
+def test_viscoelastic_arm_relaxes_exponentially(plain: np.ndarray) -> None:
+    fibre = fibre_with("passive_viscoelasticity", pv_stiffness=1.0, pv_tau=0.05, pv_ratio=0.0)
+    extra = force(fibre) - plain
+    # Straight stretch at v from 0.05 s on: k v tau (1 - exp(-t/tau)).
+    t, v = TIME[60:134] - 0.05, 0.0383 / 0.084
+    np.testing.assert_allclose(extra[60:134], v * 0.05 * (1.0 - np.exp(-t / 0.05)), rtol=2e-3, atol=1e-6)
+    decay = extra[400] / extra[350]
+    assert decay == pytest.approx(np.exp(-1.0), rel=1e-3)
+
+
+def test_weakly_bound_heads_reach_a_plateau_in_proportion_to_sites(plain: np.ndarray) -> None:
+    fibre = fibre_with("weakly_bound_heads", weak_stiffness=40.0, weak_detachment=500.0)
+    muscle = Muscle(fibre)
+    calcium = np.full(TIME.size, 10.0**-0.1)
+    states = muscle.run(muscle.settle(0.0, float(calcium[0])), np.diff(TIME), LENGTH, calcium)
+    sites = muscle.outputs_of(states)["n_on"]
+    at = 120
+    v = 0.0383 / 0.084
+    assert force(fibre)[at] - plain[at] == pytest.approx(40.0 * sites[at] * v / 500.0, rel=1e-2)
+
+
+def test_active_titin_keeps_what_an_active_stretch_gave_it_and_is_slack_below(plain: np.ndarray) -> None:
+    fibre = fibre_with("active_titin", titin_stiffness=2.0, titin_release=0.0, titin_calcium=1e-3)
+    extra = force(fibre) - plain
+    np.testing.assert_allclose(extra[320:], 2.0 * 0.0383 * (10.0**-0.1 / (10.0**-0.1 + 1e-3)), rtol=1e-9)
+    down = force(fibre, length=-LENGTH) - force(fibre_with(None), length=-LENGTH)
+    np.testing.assert_allclose(down, 0.0, atol=1e-12)
+
+
+def test_static_stiffness_follows_length_and_calcium_alone(plain: np.ndarray) -> None:
+    fibre = fibre_with("static_calcium_stiffness", calcium_stiffness=2.0, stiffness_calcium=10.0**-0.1)
+    np.testing.assert_allclose(force(fibre) - plain, 0.5 * 2.0 * LENGTH, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "value", "instead"),
+    [
+        ("length_dependent_activation", {"calcium_per_length": 2.0}, "kon"),
+        ("lattice_spacing", {"attachment_per_length": 2.0}, "f"),
+    ],
+)
+def test_length_acts_as_another_parameter_would(mechanism: str, value: dict[str, float], instead: str) -> None:
+    long, calcium = 0.05, 10.0**-0.2
+    fibre = fibre_with(mechanism, **value)
+    same = fibre_with(None, **{instead: fibre.values[instead] * float(np.exp(2.0 * long))})
+    ours, theirs = (Muscle(f) for f in (fibre, same))
+    a, b = (m.outputs(m.settle(long, calcium)).force_ce_f0 for m in (ours, theirs))
+    assert a == pytest.approx(b, rel=1e-7)
+
+
+def test_stretch_recruits_as_force_would() -> None:
+    long, calcium = 0.05, 10.0**-0.2
+    fibre = fibre_with("strain_recruited_heads", strain_recruitment=200.0)
+    muscle = Muscle(fibre)
+    out = muscle.outputs(muscle.settle(long, calcium))
+    v = fibre.values
+    relaxed = 1.0 - out.q0 - out.drx
+    # At rest as many heads come as go: J1 (1 + JF F + kappa ΔL) S = J2 D.
+    flow = v["J1"] * (1.0 + v["JF"] * (out.q0 + out.q1) + 200.0 * long) * relaxed
+    assert flow == pytest.approx(v["J2"] * out.drx, rel=1e-6)
+
+
+def test_warmer_is_faster_and_no_stronger(plain: np.ndarray) -> None:
+    """All rates twice as fast: the same forces in half the time."""
+    fibre = fibre_with("temperature", warmer=10.0, q10=2.0)
+    muscle, calcium = Muscle(fibre), np.full(TIME.size, 10.0**-0.1)
+    start = muscle.settle(0.0, float(calcium[0]))
+    fast = muscle.outputs_of(muscle.run(start, np.diff(TIME) / 2.0, LENGTH, calcium))["force_f0"]
+    np.testing.assert_allclose(fast, plain, atol=2e-4)
+
+
+def test_heads_bear_curved_force_over_strain() -> None:
+    fibre = fibre_with("nonlinear_crossbridge", head_curvature=0.1)
+    muscle = Muscle(fibre)
+    calcium = np.full(TIME.size, 10.0**-0.1)
+    out = muscle.outputs_of(muscle.run(muscle.settle(0.0, float(calcium[0])), np.diff(TIME), LENGTH, calcium))
+    borne = out["q0"] + out["q1"] + 0.1 * (out["q0"] + 2.0 * out["q1"] + out["q2"])
+    np.testing.assert_allclose(out["force_ce_f0"], fibre.values["Fscale"] * borne, rtol=1e-12)
+
+
+def test_mechanisms_add_up_in_one_model(plain: np.ndarray) -> None:
+    both = fibre_with("viscous_drag+static_calcium_stiffness", drag=0.02, calcium_stiffness=1.0)
+    one = force(fibre_with("viscous_drag", drag=0.02)) - plain
+    other = force(fibre_with("static_calcium_stiffness", calcium_stiffness=1.0)) - plain
+    np.testing.assert_allclose(force(both) - plain, one + other, atol=1e-12)
+
+
+@pytest.mark.parametrize("mechanism", ["viscous_drag", "length_dependent_activation", "filament_overlap"])
+def test_hill_type_models_take_what_needs_no_heads(mechanism: str) -> None:
+    effect = EFFECT[mechanism]
+    bare = force(fibre_with(None, base="hill_se"))
+    nothing = fibre_with(mechanism, base="hill_se", **{next(iter(effect)): 0.0})
+    np.testing.assert_allclose(force(nothing), bare, atol=1e-9)
+    assert np.max(np.abs(force(fibre_with(mechanism, base="hill_se", **effect)) - bare)) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("hill_se+lattice_spacing", "needs heads"),
+        ("2state_coop+strain_recruited_heads", "needs super-relaxed heads"),
+        ("3state_coop+thick_filament_cooperativity", "part of this model already"),
+        ("3state_coop+viscous_drag+viscous_drag", "named twice"),
+        ("3state_coop+viscous_drga", "viscous_drag"),
+        ("hill+thick_filament_cooperativity", "needs heads"),
+    ],
+)
+def test_mechanisms_that_do_not_go_with_a_model_are_refused_in_one_line(name: str, why: str) -> None:
+    with pytest.raises(UserError, match=why) as caught:
+        split_set(name)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_swap_makes_the_model_that_has_the_block() -> None:
+    for name, swapped in (("2state_coop+thick_filament_cooperativity", "3state_coop"),
+                          ("3state_coop+forcible_detachment", "4state_coop"),
+                          ("2state+thin_filament_cooperativity", "2state_coop"),
+                          ("3state_coop_rigid+series_compliance", "3state_coop")):  # fmt: skip
+        ours, theirs = compose(name), compose(swapped)
+        assert isinstance(ours, Composition)
+        assert isinstance(theirs, Composition)
+        assert [type(b) for b in ours.blocks] == [type(b) for b in theirs.blocks]
+    assert set(SWAPS).isdisjoint(EXTRAS)
+
+
+def test_a_set_with_mechanisms_starts_from_the_one_without() -> None:
+    flat = {"fibre": "x", "constants.reference_length_m": 1.0, "constants.f0_n": 1.0}
+    source = load_fibre("18Dec2017a", BASE)
+    flat |= {f"models.{BASE}.{key}": value for key, value in source.values.items()}
+    flat |= {f"models.{BASE}+viscous_drag.drag": 0.03}
+    fibre = fibre_from_parameters(flat, "test", f"{BASE}+viscous_drag")
+    assert fibre.values["drag"] == 0.03
+    assert fibre.values["JF"] == source.values["JF"]
