@@ -27,7 +27,7 @@ def fit(rmsd: float, *names: Name) -> Fit:
 
 
 def scores(rmsd: float) -> HeldOut:
-    return HeldOut(dict.fromkeys(TRIALS, rmsd ** 2), dict.fromkeys(TRIALS, 1000))
+    return HeldOut(dict.fromkeys(TRIALS, rmsd**2), dict.fromkeys(TRIALS, 1000))
 
 
 def evidence(final: Fit, *others: Fit, base: float = 0.006, **changes: Any) -> Evidence:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.solve import Objective
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.models.registry import SWAPS
 
 Array = npt.NDArray[np.float64]
 
@@ -103,8 +104,9 @@ def _faults(study: Study, fit: Fit, linear: Linear) -> Iterator[Screened]:
 
 
 def _mechanisms(study: Study, fit: Fit, linear: Linear) -> Iterator[Screened]:
-    training = Training(linear.problem)
-    force = training.force(linear.problem.start)
+    plain = _without_extras(fit.explanation)
+    problem = study.problem(plain, fit.values)
+    force = Training(problem).force(problem.start)
     for entry in applicable(study.fibre.model):
         if entry.name in fit.explanation.mechanisms or not _goes_with(study, fit.explanation, entry.name):
             continue
@@ -112,7 +114,16 @@ def _mechanisms(study: Study, fit: Fit, linear: Linear) -> Iterator[Screened]:
         if entry.effect is None:
             yield Screened(entry.name, np.nan, np.empty(0), tuple(starts))
             continue
-        yield _along_lines(study, fit, linear, entry, starts, force)
+        yield _along_lines(study, plain, linear, entry, starts, force)
+
+
+def _without_extras(explanation: Explanation) -> Explanation:
+    """The explanation as far as it takes the place of blocks.
+
+    What a mechanism adds to the forces is much the same beside another one as without it, and every pair would have to
+    be compiled to tell the difference.
+    """
+    return replace(explanation, mechanisms=tuple(n for n in explanation.mechanisms if n.value in SWAPS))
 
 
 def _goes_with(study: Study, explanation: Explanation, name: Name) -> bool:
@@ -124,12 +135,12 @@ def _goes_with(study: Study, explanation: Explanation, name: Name) -> bool:
 
 
 def _along_lines(
-    study: Study, fit: Fit, linear: Linear, entry: Entry, starts: list[dict[str, float]], force: Array
+    study: Study, plain: Explanation, linear: Linear, entry: Entry, starts: list[dict[str, float]], force: Array
 ) -> Screened:
     """A mechanism at each of its starting values, followed along the line from its absence."""
     assert entry.effect is not None
     best = Screened(entry.name, 0.0, np.empty(0), (starts[0],))
-    explanation = fit.explanation.plus(entry.name)
+    explanation = plain.plus(entry.name)
     for start in starts:
         problem = study.problem(explanation, start)
         try:

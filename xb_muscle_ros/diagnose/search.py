@@ -29,7 +29,8 @@ class Effort:
 
     Attributes:
         steps: explanations put together at most.
-        candidates: fitted at each step.
+        candidates: fitted at the first step.
+        later: fitted at each further step, where every one is a model that has to be compiled first.
         most: points to try in a fit.
         folds: into which trials are split for held-out scores.
         rivals: of the answer whose held-out scores are computed.
@@ -38,7 +39,8 @@ class Effort:
     """
 
     steps: int = 3
-    candidates: int = 7
+    candidates: int = 8
+    later: int = 4
     most: int = 20
     folds: int = 7
     rivals: int = 4
@@ -46,7 +48,7 @@ class Effort:
     closure: int = 2
 
 
-QUICK = Effort(steps=2, candidates=5, most=12, folds=3, rivals=2, draws=400, closure=1)
+QUICK = Effort(steps=2, candidates=6, later=3, most=12, folds=3, rivals=2, draws=400, closure=1)
 
 
 @dataclass
@@ -162,7 +164,7 @@ class Searcher:
 
     def _step(self, final: Fit, candidates: Sequence[Screened], step: int) -> Fit | None:
         """The best fit with one more explanation, or None where none is worth it."""
-        chosen = _promising(candidates, final.cost, self.effort.candidates)
+        chosen = _promising(candidates, final.cost, self.effort.later if step else self.effort.candidates)
         wanted = [(final.explanation.plus(s.name), s.starts) for s in chosen]
         fits = self.fitted(wanted, f"step {step + 1}")
         best = min(fits, key=penalised, default=None)

@@ -68,7 +68,7 @@ class Row(NamedTuple):
     def composed(self, name: str, method: type[Representation]) -> Model:
         """The model, with a representation of the heads' strain."""
         return Composition(
-            name=f"{name}_{method.name}".replace(SEPARATOR, "_with_"),
+            name=f"{_same_as(self, name)}_{method.name}",
             thin_filament=self.thin_filament(),
             thick_filament=self.thick_filament(),
             attachment=self.attachment(),
@@ -97,13 +97,20 @@ class HillRow(NamedTuple):
     def composed(self, name: str, method: type[Representation]) -> Model:
         """The model; it has no heads whose strain could be represented in one way or another."""
         return Hill(
-            name=name.replace(SEPARATOR, "_with_"),
+            name=_same_as(self, name),
             activation=self.activation(),
             force_velocity=self.force_velocity(),
             series=self.series(),
             parallel=self.parallel(),
             extras=tuple(extra() for extra in self.extras),
         )
+
+
+def _same_as(row: Row | HillRow, name: str) -> str:
+    """Name of the compiled module: models of the same blocks share it, whatever they are called."""
+    bare = row._replace(extras=())
+    same = next((known for known, blocks in MODELS.items() if blocks == bare), name.split(SEPARATOR)[0])
+    return "_with_".join([same, *(extra.name for extra in row.extras)])
 
 
 _BASES: Mapping[str, Row | HillRow] = {
