@@ -223,6 +223,7 @@ def test_names_find_their_places() -> None:
     assert (found.fibres.tolist(), found.values.tolist(), found.new) == ([1], [1], ["ghost"])
     assert names.places(["ghost", "right", "right"], 3, "position").new == []
     assert names.places(["ghost"], 1, "position").new == []
+    assert names.places([], 3, "position").fibres.tolist() == [0, 1, 2]
     for wrong, values in ((["left"], 2), ([], 2), ([], 1), (["left", "right"], 1)):
         with pytest.raises(Refusal, match="send one per name"):
             names.places(wrong, values, "position")

@@ -119,6 +119,8 @@ class LockstepMany:
         if self.counts["time went back"] != again:
             self._chorus.flush()
             self._scales = scale_rows([timeline.scale for timeline in self._timelines])
+        # The batch knows its fibres by their place.
+        plans.sort(key=lambda entry: entry[0])
         states = self._together(plans)
         if states is not None:
             for (i, plan), state in zip(plans, states, strict=True):
@@ -149,8 +151,6 @@ class LockstepMany:
         dt_s = plans[0][1].dt_s
         if any(plan.state is None or plan.dt_s != dt_s for _, plan in plans):
             return None
-        # The batch knows its fibres by their place.
-        plans.sort(key=lambda entry: entry[0])
         states = np.array([plan.state for _, plan in plans])
         change = np.array([plan.change_l0 for _, plan in plans])
         calcium = np.array([plan.calcium_um for _, plan in plans])

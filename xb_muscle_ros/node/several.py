@@ -72,6 +72,8 @@ class NamesOfMany:
         return found
 
     def _find(self, names: Sequence[str]) -> Places:
+        if not names:
+            return Places(self._all, None, [])
         place: dict[int, int] = {}
         new: dict[str, None] = {}
         for k, name in enumerate(names):
