@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -64,7 +65,7 @@ def random_stretches(ticks: int, seed: int) -> Iterator[Stretches]:
     begin_ns, length = 0, 0.0
     for first in range(0, ticks, CHUNK):
         count = min(CHUNK, ticks - first)
-        dt_ns = np.exp(rng.uniform(*np.log(_STEP_S), count)) * 1e9
+        dt_ns = _log_uniform(rng, _STEP_S, count) * 1e9
         stamps = begin_ns + np.cumsum(np.maximum(dt_ns.astype(np.int64), 1))
         lengths = np.empty(count)
         k = 0
@@ -72,13 +73,19 @@ def random_stretches(ticks: int, seed: int) -> Iterator[Stretches]:
             run = min(int(rng.integers(1, 60)), count - k)
             seconds = (stamps[k : k + run] - (stamps[k - 1] if k else begin_ns)) * 1e-9
             target = rng.uniform(*_LENGTH_L0)
-            speed = np.exp(rng.uniform(*np.log(_SPEED_L0_PER_S)))
+            speed = float(_log_uniform(rng, _SPEED_L0_PER_S, 1)[0])
             lengths[k : k + run] = length + np.clip(target - length, -speed * seconds, speed * seconds)
             length = float(lengths[k + run - 1])
             k += run
         begin_ns = int(stamps[-1])
         before = np.unique(np.concatenate([[0], rng.integers(0, count, count // 50)]))
         yield Stretches(stamps, lengths, before, 10.0 ** (6.0 - rng.uniform(*_PCA, before.size)))
+
+
+def _log_uniform(rng: np.random.Generator, bounds: tuple[float, float], count: int) -> Array:
+    """Numbers as often in one decade as in another."""
+    found: Array = np.exp(rng.uniform(math.log(bounds[0]), math.log(bounds[1]), count))
+    return found
 
 
 class Balance:
@@ -94,12 +101,14 @@ class Balance:
         Raises:
             UserError: the model has no cross-bridges on an exponential spring.
         """
+        from scipy.special import roots_legendre
+
         missing = {"kse", "kse0", "gamma", "Fscale", "koop"} - set(fibre.values)
         if missing:
             raise UserError(f"model {fibre.model} has no heads on a series spring to balance; take 3state_coop")
         self._v = fibre.values
         self._force = np.linspace(-1.0, 4.0, 50_001)
-        nodes, weights = np.polynomial.legendre.leggauss(8)
+        nodes, weights = roots_legendre(8)
         half = 0.5 * (self._force[1] - self._force[0])
         middle = 0.5 * (self._force[1:] + self._force[:-1])
         panels = half * np.sum(weights / self._stiffness(middle[:, None] + half * nodes), axis=1)

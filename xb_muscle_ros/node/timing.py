@@ -1,5 +1,7 @@
 """How well a node keeps time on this machine: lateness of ticks, and the way from length to force and back."""
 
+# mypy: allow-untyped-calls
+
 from __future__ import annotations
 
 import math
@@ -94,7 +96,7 @@ def run_roundtrip(duration_s: float, rate_hz: float, fibre: str = "18Dec2017a", 
         fibres: how many the node has, all in each message.
 
     Returns:
-        ``p50_us``, ``p99_us``, ``p99.9_us``, ``max_us``; ``first_us`` and ``last_us``, medians of first and last quarter;
+        ``p50_us``, ``p99_us``, ``p99.9_us``, ``max_us``; ``first_us``, ``last_us``: medians of first and last quarter;
         ``behind``: messages sent after the deadline of the next; ``rate_hz`` reached; ``cpu_share`` of the
         node; ``load`` as in `run_timing`.
 
