@@ -70,6 +70,7 @@ setup(
         "console_scripts": [
             "xb_muscle = xb_muscle_ros.cli.main:console",
             "muscle_node = xb_muscle_ros.node.main:main",
+            "plant_node = xb_muscle_ros.plant.plant_node:main",
         ]
     },
     zip_safe=False,

@@ -90,7 +90,7 @@ def test_every_typed_and_data_file_is_installed(arguments: dict[str, Any]) -> No
 
 def test_programs_can_be_run_by_ros2_run() -> None:
     programs = list((ROOT / "scripts" / "ros").iterdir())
-    assert {path.name for path in programs} == {"muscle_node", "xb_muscle"}
+    assert {path.name for path in programs} == {"muscle_node", "plant_node", "xb_muscle"}
     for path in programs:
         assert path.stat().st_mode & 0o111
         assert path.read_text().startswith("#!/usr/bin/env python3\n")

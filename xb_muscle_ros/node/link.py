@@ -48,6 +48,19 @@ class Link:
             )
         except Exception as error:
             raise UserError(f"ROS 2 cannot be started: {error}; check ROS_DOMAIN_ID and the network") from error
+        self._serve()
+
+    @classmethod
+    def around(cls, node: Any) -> Link:
+        """The same with a node that is there already; closing ends it and its context."""
+        link = cls.__new__(cls)
+        link.peer = ""
+        link.node = node
+        link._context = node.context
+        link._serve()
+        return link
+
+    def _serve(self) -> None:
         self._executor = make_executor(self._context)
         self._executor.add_node(self.node)
 

@@ -112,12 +112,16 @@ def is_foreign(name: str) -> bool:
 
 
 def check_node_parameter(name: str, value: object) -> Value:
+    """`check_value` for a parameter of the node."""
+    return check_value(name, NODE_PARAMETERS[name], value)
+
+
+def check_value(name: str, row: Row, value: object) -> Value:
     """Return a value of the row's type; whole numbers may stand for floating ones.
 
     Raises:
         UserError: another type, not finite, out of range, or not among the choices.
     """
-    row = NODE_PARAMETERS[name]
     kind = type(row.default)
     if kind is tuple:
         return _texts(name, value)
@@ -157,7 +161,11 @@ def unknown(name: str, declared: Iterable[str]) -> UserError:
 
 def node_descriptor(name: str) -> ParameterDescriptor:
     """Descriptor of a parameter of the node."""
-    row = NODE_PARAMETERS[name]
+    return row_descriptor(NODE_PARAMETERS[name])
+
+
+def row_descriptor(row: Row) -> ParameterDescriptor:
+    """Descriptor of a parameter that a row describes."""
     unit = f" [{row.unit}]" if row.unit else ""
     descriptor = ParameterDescriptor(description=f"{row.meaning}{unit}; set {row.when}", read_only=row.when == START)
     if row.choices:
