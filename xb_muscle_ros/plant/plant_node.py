@@ -82,6 +82,7 @@ class PlantNode:
         self._body = Body(given["scene"], fibre, platform, given["elastic_tendon"])
         self._ticks = round(given["duration_s"] / self._body.plant.tick_s)
         self._link = Link.around(node)
+        self._link.stop = stop
         self._end = MuscleEnd(self._link, self._body.plant.muscles, self._body.fibre, self._mode)
         self._to_joint = node.create_publisher(JointState, "plant/joint", 100)
         self._joint = JointState(name=[given["scene"]])
@@ -176,7 +177,7 @@ class PlantNode:
         ticker.start(period, lambda: 10, 0, self._log, lambda: None)
         try:
             while not self._stop() and self._body.tick < self._ticks:
-                self._link.wait_for(lambda: self._stop() or self._body.tick >= self._ticks, 0.1)
+                self._link.wait_for(lambda: self._body.tick >= self._ticks, 0.1)
                 since = self._waiting_since
                 if since is not None and time.monotonic() - since > _FIND_S:
                     self._insist(self._look_again)
