@@ -104,7 +104,7 @@ class MuscleNode(LifecycleNode):
             # rclpy keeps quiet about exceptions in transitions.
             return self._fail(UserError(f"{type(error).__name__}: {error}"))
         names = enumerated([fibre.name for fibre in fibres])
-        who = f"{len(fibres)} fibres ({names})" if self._gate.many else f"fibre {names}"
+        who = f"fibre {names}" if len(fibres) == 1 else f"{len(fibres)} fibres ({names})"
         self.get_logger().info(f"{who}, model {fibres[0].model}, mode {self._mode}; {_constants(fibres)}")
         return super().on_configure(state)
 
