@@ -83,7 +83,7 @@ def test_every_folder_with_code_is_packaged(arguments: dict[str, Any]) -> None:
 def test_every_typed_and_data_file_is_installed(arguments: dict[str, Any]) -> None:
     assert "py.typed" in arguments["package_data"][PACKAGE.name]
     installed = {name for _, names in arguments["data_files"] for name in names}
-    data = [*ROOT.glob("config/**/*.yaml"), *ROOT.glob("launch/*"), *ROOT.glob("scripts/ros/*")]
+    data = [*ROOT.glob("config/**/*.*"), *ROOT.glob("launch/*"), *ROOT.glob("scripts/ros/*")]
     expected = {str(path.relative_to(ROOT)) for path in data if path.is_file()}
     assert expected | {"package.xml", "resource/xb_muscle_ros"} == installed
 
