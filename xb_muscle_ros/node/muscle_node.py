@@ -29,6 +29,7 @@ from xb_muscle_ros.node.lockstep_many import LockstepMany, scale_of
 from xb_muscle_ros.node.memory import lock_memory, unlock_memory
 from xb_muscle_ros.node.outputs import OutputMessages, OutputMessagesMany
 from xb_muscle_ros.node.parameter_gate import ParameterGate
+from xb_muscle_ros.node.priority import drop_priority, take_priority
 from xb_muscle_ros.node.realtime import Realtime, Settings
 from xb_muscle_ros.node.realtime_many import RealtimeMany
 from xb_muscle_ros.node.reporter import Reporter
@@ -116,6 +117,10 @@ class MuscleNode(LifecycleNode):
         gc.freeze()
         if self._gate.value("lock_memory"):
             lock_memory(self.get_logger())
+        priority = self._gate.value("realtime_priority")
+        if self._mode == "realtime" and priority > 1:
+            # Whoever holds the interpreter must not be pushed aside while a tick waits for it: callbacks rank next.
+            take_priority(priority - 1, self.get_logger())
         self._set_active(True)
         if self._stepping is not None:
             self._stepping.start()
@@ -200,6 +205,7 @@ class MuscleNode(LifecycleNode):
         if self._stepping is not None:
             self._stepping.stop()
         gc.unfreeze()
+        drop_priority()
         if self._gate.value("lock_memory"):
             unlock_memory()
 

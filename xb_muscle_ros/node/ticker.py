@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import threading
 import time
 from collections.abc import Callable
 
 from xb_muscle_ros.node.lateness import Lateness
+from xb_muscle_ros.node.priority import take_priority
 from xb_muscle_ros.node.status import Log
 from xb_muscle_ros.node.waiting import make_waiter
 
@@ -68,8 +68,8 @@ class Ticker:
         """
 
         def run() -> None:
-            if priority:
-                _take_priority(priority, log)
+            if priority and take_priority(priority, log):
+                log.info(f"ticks run under SCHED_FIFO with priority {priority}")
             begin()
             self._run(period_ns, max_catch_up)
 
@@ -110,16 +110,3 @@ class Ticker:
                 self._tick(deadline + i * period)
             self._done()
             deadline += (missed + 1) * period
-
-
-def _take_priority(priority: int, log: Log) -> None:
-    try:
-        # 0 is the calling thread, on Linux.
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
-    except (AttributeError, OSError) as error:
-        log.warning(
-            f"realtime_priority {priority} is not permitted here ({error}): ticks go on with ordinary scheduling; "
-            "allow it with 'ulimit -r', an rtprio line in limits.conf or CAP_SYS_NICE"
-        )
-    else:
-        log.info(f"ticks run under SCHED_FIFO with priority {priority}")
