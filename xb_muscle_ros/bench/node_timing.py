@@ -5,17 +5,23 @@ from __future__ import annotations
 from xb_muscle_ros.bench.measure import Figure
 
 
-def figures(duration_s: float, rate_hz: float) -> list[Figure]:
+def figures(duration_s: float, rate_hz: float, priority: int = 0) -> list[Figure]:
     """Lateness, overruns and processor share of a realtime node, beside a plain timer's at the same time.
+
+    Args:
+        duration_s, rate_hz: of the run, s and Hz.
+        priority: of the node, ``realtime_priority``; the plain timer has none.
 
     Raises:
         UserError: a node does not start or stops early.
     """
     from xb_muscle_ros.node.timing import run_beside_plain_timer
 
-    ours, plain = run_beside_plain_timer(duration_s, rate_hz)
-    made = _of_ticks(f"node, {rate_hz:g} Hz for {duration_s:g} s", ours, duration_s * rate_hz)
-    return made + _of_ticks(f"plain timer, {rate_hz:g} Hz for {duration_s:g} s", plain, duration_s * rate_hz)
+    settings = {"realtime_priority": priority, "lock_memory": priority > 0}
+    ours, plain = run_beside_plain_timer(duration_s, rate_hz, settings=settings)
+    name = f"{_prioritised('node', priority)}, {rate_hz:g} Hz for {duration_s:g} s"
+    made = _of_ticks(name, ours, duration_s * rate_hz)
+    return made + _of_ticks(f"plain timer beside {name}", plain, duration_s * rate_hz)
 
 
 def roundtrip_figures(duration_s: float, rate_hz: float) -> list[Figure]:
@@ -29,7 +35,7 @@ def roundtrip_figures(duration_s: float, rate_hz: float) -> list[Figure]:
     return _of_answers(f"round trip, {rate_hz:g} Hz for {duration_s:g} s", run_roundtrip(duration_s, rate_hz))
 
 
-def many_figures(duration_s: float, rate_hz: float, fibres: int) -> list[Figure]:
+def many_figures(duration_s: float, rate_hz: float, fibres: int, priority: int = 0) -> list[Figure]:
     """A node of many fibres, in realtime and then in lockstep.
 
     Raises:
@@ -38,9 +44,16 @@ def many_figures(duration_s: float, rate_hz: float, fibres: int) -> list[Figure]
     from xb_muscle_ros.node.timing import run_roundtrip, run_timing
 
     name = f"{fibres} fibres, {rate_hz:g} Hz for {duration_s:g} s"
-    realtime = run_timing(duration_s, rate_hz, fibres=fibres)
+    settings = {"realtime_priority": priority, "lock_memory": priority > 0}
+    realtime = run_timing(duration_s, rate_hz, fibres=fibres, settings=settings)
     lockstep = run_roundtrip(duration_s, rate_hz, fibres=fibres)
-    return _of_ticks(name, realtime, duration_s * rate_hz) + _of_answers(f"{name}, round trip", lockstep)
+    return _of_ticks(_prioritised(name, priority), realtime, duration_s * rate_hz) + _of_answers(
+        f"{name}, round trip", lockstep
+    )
+
+
+def _prioritised(name: str, priority: int) -> str:
+    return f"{name} (SCHED_FIFO {priority})" if priority else name
 
 
 def _of_ticks(name: str, result: dict[str, float], due: float) -> list[Figure]:

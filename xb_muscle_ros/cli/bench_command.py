@@ -27,6 +27,9 @@ def add(subparsers: Subparsers) -> None:
         "--duration", type=float, default=60.0, help="of the studies node, roundtrip and many, s (default 60)"
     )
     parser.add_argument("--rate", type=float, help="of those, Hz (default: node 1000, roundtrip and many 500)")
+    parser.add_argument(
+        "--priority", type=int, default=0, help="realtime_priority of the node in node and many (default 0: ordinary)"
+    )
     parser.add_argument("--fibers", type=int, default=100, help="of the study many (default 100)")
     parser.add_argument("--ticks", type=int, default=10_000_000, help="of the study soak (default 10 million)")
     parser.add_argument(
@@ -81,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
     if "node" in arguments.study:
         from xb_muscle_ros.bench import node_timing
 
-        made += node_timing.figures(arguments.duration, arguments.rate or 1000.0)
+        made += node_timing.figures(arguments.duration, arguments.rate or 1000.0, arguments.priority)
     if "roundtrip" in arguments.study:
         from xb_muscle_ros.bench import node_timing
 
@@ -89,7 +92,9 @@ def run(arguments: argparse.Namespace) -> int:
     if "many" in arguments.study:
         from xb_muscle_ros.bench import node_timing
 
-        made += node_timing.many_figures(arguments.duration, arguments.rate or 500.0, arguments.fibers)
+        made += node_timing.many_figures(
+            arguments.duration, arguments.rate or 500.0, arguments.fibers, arguments.priority
+        )
     if "soak" in arguments.study:
         from xb_muscle_ros.bench import soak
 

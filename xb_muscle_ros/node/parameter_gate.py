@@ -19,6 +19,7 @@ from xb_muscle_ros.node.configuration import GROUPS, WHERE, configure, configure
 from xb_muscle_ros.node.parameters import (
     INACTIVE,
     NODE_PARAMETERS,
+    OF_GRIDS,
     START,
     TEXTS,
     UNCONFIGURED,
@@ -240,6 +241,9 @@ class ParameterGate:
             before = self.fibres[prefix].values
             if (fibre.values["smoothing"] > 0.0) != (before["smoothing"] > 0.0):
                 raise UserError(f"parameter 'smoothing' can be switched on or off {UNCONFIGURED} only; clean up first")
+            for name in OF_GRIDS:
+                if fibre.values.get(name) != before.get(name):
+                    raise UserError(f"parameter '{name}' can be set {UNCONFIGURED} only; clean up first")
 
     def _by_fibre(self, new: Mapping[str, object]) -> dict[str, dict[str, object]]:
         """Parameters of the fibres by prefix and flat name.

@@ -82,6 +82,9 @@ NODE_PARAMETERS: Mapping[str, Row] = MappingProxyType(
     }
 )
 
+# A state is of its grid: with another it would mean something else, or not fit.
+OF_GRIDS = ("bins", "strain_range")
+
 TEXTS: Mapping[str, str] = MappingProxyType(
     {
         "fibre": "name of the fibre, as in the messages",
@@ -187,7 +190,9 @@ def fibre_descriptor(name: str) -> ParameterDescriptor:
         # One of many fibres.
         return fibre_descriptor(rest)
     table, key = (CONSTANTS, rest) if head == "constants" else (PARAMETERS, rest.rpartition(".")[2])
-    when = "takes effect at the next reset" if head == "constants" else f"set {ALWAYS}"
+    when = f"set {UNCONFIGURED if key in OF_GRIDS else ALWAYS}"
+    if head == "constants":
+        when = "takes effect at the next reset"
     if key not in table:
         raise UserError(f"parameter '{name}' is not known{suggest(key, table)}")
     row = table[key]
