@@ -25,7 +25,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/launch", files("launch/*.launch.py")),
-        (f"share/{NAME}/config", files("config/*.yaml")),
+        (f"share/{NAME}/config", files("config/*.*")),
         (f"share/{NAME}/config/fibers", files("config/fibers/*.yaml")),
         # `ros2 run` and launch look in lib/<package>; pip puts console scripts only in bin/.
         (f"lib/{NAME}", files("scripts/ros/*")),
@@ -70,6 +70,7 @@ setup(
         "console_scripts": [
             "xb_muscle = xb_muscle_ros.cli.main:console",
             "muscle_node = xb_muscle_ros.node.main:main",
+            "plant_node = xb_muscle_ros.plant.plant_node:main",
         ]
     },
     zip_safe=False,

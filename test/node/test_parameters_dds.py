@@ -83,6 +83,17 @@ def test_a_bad_set_is_refused_whole(lockstep: Any, bad: dict[str, object], reaso
     assert lockstep.link.parameters([good]) == before
 
 
+def test_a_running_grid_keeps_its_size(start: Callable[..., Any]) -> None:
+    """A state has as many bins as it has; another rate is fine."""
+    driver = start(mode="lockstep", method="characteristics")
+    for name, value in (("bins", 100.0), ("strain_range", 20.0)):
+        with pytest.raises(UserError, match=f"'{name}' can be set when unconfigured only"):
+            driver.link.set_parameters({f"models.3state_coop.{name}": value})
+    driver.link.set_parameters({F: 70.0, "models.3state_coop.bins": 200.0})
+    driver.calcium(0.0, 5.0)
+    assert driver.ask(1.0, 1.0) is not None
+
+
 def test_parameters_on_top_of_a_file(start: Callable[..., Any]) -> None:
     """The name and the set in use may differ from those of the file; what was given survives a clean-up."""
     driver = start(mode="lockstep", fibre="left_soleus", model="2state")

@@ -83,14 +83,14 @@ def test_every_folder_with_code_is_packaged(arguments: dict[str, Any]) -> None:
 def test_every_typed_and_data_file_is_installed(arguments: dict[str, Any]) -> None:
     assert "py.typed" in arguments["package_data"][PACKAGE.name]
     installed = {name for _, names in arguments["data_files"] for name in names}
-    data = [*ROOT.glob("config/**/*.yaml"), *ROOT.glob("launch/*"), *ROOT.glob("scripts/ros/*")]
+    data = [*ROOT.glob("config/**/*.*"), *ROOT.glob("launch/*"), *ROOT.glob("scripts/ros/*")]
     expected = {str(path.relative_to(ROOT)) for path in data if path.is_file()}
     assert expected | {"package.xml", "resource/xb_muscle_ros"} == installed
 
 
 def test_programs_can_be_run_by_ros2_run() -> None:
     programs = list((ROOT / "scripts" / "ros").iterdir())
-    assert {path.name for path in programs} == {"muscle_node", "xb_muscle"}
+    assert {path.name for path in programs} == {"muscle_node", "plant_node", "xb_muscle"}
     for path in programs:
         assert path.stat().st_mode & 0o111
         assert path.read_text().startswith("#!/usr/bin/env python3\n")

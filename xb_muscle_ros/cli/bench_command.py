@@ -12,7 +12,7 @@ from xb_muscle_ros.cli.common import add_fibre, warn
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
 
-STUDIES = ("rhs", "trial", "batch", "start", "cost", "fast", "fit", "node")
+STUDIES = ("rhs", "trial", "batch", "start", "cost", "fast", "fit", "node", "roundtrip", "many", "soak")
 
 
 def add(subparsers: Subparsers) -> None:
@@ -23,8 +23,15 @@ def add(subparsers: Subparsers) -> None:
     add_fibre(parser, required=False)
     parser.set_defaults(fiber="18Dec2017a")
     parser.add_argument("--study", nargs="+", choices=STUDIES, default=["rhs", "trial"], help="what to measure")
-    parser.add_argument("--duration", type=float, default=60.0, help="of the node study, s (default 60)")
-    parser.add_argument("--rate", type=float, default=1000.0, help="of the node study, Hz (default 1000)")
+    parser.add_argument(
+        "--duration", type=float, default=60.0, help="of the studies node, roundtrip and many, s (default 60)"
+    )
+    parser.add_argument("--rate", type=float, help="of those, Hz (default: node 1000, roundtrip and many 500)")
+    parser.add_argument(
+        "--priority", type=int, default=0, help="realtime_priority of the node in node and many (default 0: ordinary)"
+    )
+    parser.add_argument("--fibers", type=int, default=100, help="of the study many (default 100)")
+    parser.add_argument("--ticks", type=int, default=10_000_000, help="of the study soak (default 10 million)")
     parser.add_argument(
         "--out", type=Path, default=Path("bench.json"), help="file for the figures (default bench.json)"
     )
@@ -77,7 +84,21 @@ def run(arguments: argparse.Namespace) -> int:
     if "node" in arguments.study:
         from xb_muscle_ros.bench import node_timing
 
-        made += node_timing.figures(arguments.duration, arguments.rate)
+        made += node_timing.figures(arguments.duration, arguments.rate or 1000.0, arguments.priority)
+    if "roundtrip" in arguments.study:
+        from xb_muscle_ros.bench import node_timing
+
+        made += node_timing.roundtrip_figures(arguments.duration, arguments.rate or 500.0)
+    if "many" in arguments.study:
+        from xb_muscle_ros.bench import node_timing
+
+        made += node_timing.many_figures(
+            arguments.duration, arguments.rate or 500.0, arguments.fibers, arguments.priority
+        )
+    if "soak" in arguments.study:
+        from xb_muscle_ros.bench import soak
+
+        made += soak.figures(fibre, arguments.ticks)
     print(as_text(made))
     merge_into(arguments.out, made, machine())
     print(arguments.out)

@@ -39,7 +39,7 @@ def add(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--live",
         action="store_true",
-        help="the muscles are running muscle_nodes (mode lockstep) in the namespaces /soleus and /tibialis_anterior",
+        help="the muscles are fibres of a running muscle_node (mode lockstep; what is missing is said)",
     )
     ankle = parser.add_argument_group("platform of the scene ankle")
     ankle.add_argument("--displacement", type=float, metavar="M", help="default -0.075: backwards")
@@ -57,16 +57,8 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.plant.report import table, write
     from xb_muscle_ros.plant.translation import RampAndHold
 
-    if arguments.live and (
-        arguments.scene != "ankle"
-        or arguments.elastic_tendon
-        or len(arguments.models or ()) != 1
-        or arguments.models == ["mujoco"]
-    ):
-        raise UserError(
-            "--live is of the scene ankle with rigid tendons and the one model that the nodes have; give one --model, "
-            "and drop --elastic-tendon"
-        )
+    if arguments.live and (len(arguments.models or ()) != 1 or arguments.models == ["mujoco"]):
+        raise UserError("--live is for the one model that the node has; give one --model, and not mujoco")
     scene, elastic = arguments.scene, arguments.elastic_tendon
     duration = DURATION_S[scene] if arguments.duration is None else arguments.duration
     if not 0.01 <= duration <= 60.0:
@@ -86,13 +78,13 @@ def run(arguments: argparse.Namespace) -> int:
     settings["live"] = arguments.live
     settings["tendon"] = "elastic" if elastic else "rigid"
     fibres = _fibres(arguments.fiber, arguments.models)
+    # The one place where this command touches ROS, and only when asked to.
+    if arguments.live:
+        from xb_muscle_ros.plant.live import run_ankle_live, run_knee_live
     if scene == "ankle":
         settings["platform"] = vars(platform)
         if arguments.live:
-            # The one place where this command touches ROS, and only when asked to.
-            from xb_muscle_ros.plant.live import run_ankle_live
-
-            traces = [run_ankle_live(fibre, platform, duration) for fibre in fibres if fibre is not None]
+            traces = [run_ankle_live(fibre, platform, duration, elastic) for fibre in fibres if fibre is not None]
         else:
             traces = [run_ankle(fibre, platform, duration, elastic) for fibre in fibres]
         way = "backwards" if platform.displacement_m < 0.0 else "forwards"
@@ -101,7 +93,11 @@ def run(arguments: argparse.Namespace) -> int:
             f"{platform.acceleration_m_per_s2:g} m/s²"
         )
     else:
-        traces = [run_knee(fibre, moved, duration, elastic) for moved in (False, True) for fibre in fibres]
+        if arguments.live:
+            given_fibres = [fibre for fibre in fibres if fibre is not None]
+            traces = [run_knee_live(f, moved, duration, elastic) for moved in (False, True) for f in given_fibres]
+        else:
+            traces = [run_knee(fibre, moved, duration, elastic) for moved in (False, True) for fibre in fibres]
         title = "Leg released from level"
     print(table(traces))
     draw_loop(arguments.out / "loop.png", traces, f"{title}; {settings['tendon']} tendons")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import numba
@@ -54,6 +55,23 @@ class MuscleBatch:
         """Number of fibres."""
         return len(self.muscles)
 
+    def replaced(self, index: int, fibre: Fibre) -> MuscleBatch:
+        """A batch with another fibre, of the same model, method and grid size, in one place; scratch is shared.
+
+        Raises:
+            UserError: see `MuscleBatch`.
+        """
+        muscle = Muscle(fibre)
+        if muscle.code is not self._code or muscle.parameters.size != self._p.shape[1]:
+            MuscleBatch([self.muscles[0].fibre, fibre])
+        other = copy.copy(self)
+        other._p = self._p.copy()
+        other._p[index] = muscle.parameters
+        other._p.setflags(write=False)
+        muscle.parameters = other._p[index]
+        other.muscles = (*self.muscles[:index], muscle, *self.muscles[index + 1 :])
+        return other
+
     def settle(self, length_change_l0: Array, calcium_um: Array) -> Array:
         """States after isometric activation from rest, shape (fibres, n).
 
@@ -90,6 +108,11 @@ class MuscleBatch:
 
     def outputs(self, states: Array) -> dict[str, Array]:
         """Outputs by name of `Outputs`, each of shape (fibres,)."""
+        table = self.output_table(states)
+        return {name: table[:, i].copy() for i, name in enumerate(Outputs._fields)}
+
+    def output_table(self, states: Array) -> Array:
+        """Outputs, shape (fibres, 11), a column for each name of `Outputs`."""
         table = np.empty((len(self.muscles), len(Outputs._fields)))
         self._code.outputs_many(states, self._p, table)
-        return {name: table[:, i].copy() for i, name in enumerate(Outputs._fields)}
+        return table

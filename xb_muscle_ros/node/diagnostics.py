@@ -17,6 +17,7 @@ class Report:
 
     Attributes:
         node, fibre, model, mode, state: names; `state` is that of the lifecycle.
+        fibres: how many there are.
         status: of the stepping; None where none is configured.
         rate_hz: steps per second since the last report.
         input_age_s: since the last length sample that was taken; None where there was none.
@@ -32,6 +33,7 @@ class Report:
     mode: str
     state: str
     fibre: str = ""
+    fibres: int = 0
     model: str = ""
     status: Status | None = None
     rate_hz: float = 0.0
@@ -94,6 +96,7 @@ def _values(report: Report) -> Mapping[str, str]:
         "state": report.state,
         "mode": report.mode,
         "fibre": report.fibre,
+        "fibres": str(report.fibres),
         "model": report.model,
         "rate (Hz)": f"{report.rate_hz:.1f}",
         "input age (s)": "none yet" if report.input_age_s is None else f"{report.input_age_s:.3f}",

@@ -24,12 +24,17 @@ _ANSWER_S = 10.0
 _SEND_AGAIN_S = 3.0
 
 
+def _never() -> bool:
+    return False
+
+
 class Link:
     """A node of its own with a muscle node on the other side; closes with the ``with`` block.
 
     Attributes:
         node: the rclpy node.
         peer: full name of the muscle node; empty until found.
+        stop: asked while waiting; where it says so, no wait goes on.
     """
 
     def __init__(self, name: str, namespace: str = "", domain_id: int | None = None) -> None:
@@ -48,6 +53,20 @@ class Link:
             )
         except Exception as error:
             raise UserError(f"ROS 2 cannot be started: {error}; check ROS_DOMAIN_ID and the network") from error
+        self._serve()
+
+    @classmethod
+    def around(cls, node: Any) -> Link:
+        """The same with a node that is there already; closing ends it and its context."""
+        link = cls.__new__(cls)
+        link.peer = ""
+        link.node = node
+        link._context = node.context
+        link._serve()
+        return link
+
+    def _serve(self) -> None:
+        self.stop: Callable[[], bool] = _never
         self._executor = make_executor(self._context)
         self._executor.add_node(self.node)
 
@@ -71,7 +90,7 @@ class Link:
         end = time.monotonic() + timeout_s
         while not condition():
             rest = end - time.monotonic()
-            if rest <= 0.0:
+            if rest <= 0.0 or self.stop():
                 return False
             self._executor.spin_once(timeout_sec=min(rest, 0.05))
         return True
@@ -113,7 +132,7 @@ class Link:
         try:
             end = time.monotonic() + timeout_s
             futures: list[Any] = []
-            while (rest := end - time.monotonic()) > 0.0:
+            while (rest := end - time.monotonic()) > 0.0 and not self.stop():
                 if self.wait_for(client.service_is_ready, rest):
                     futures.append(client.call_async(request))
                     self.wait_for(lambda: any(future.done() for future in futures), min(rest, _SEND_AGAIN_S))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import gc
 import time
-from collections.abc import Callable
+from collections.abc import Sequence
 from typing import Any
 
 from rclpy.clock import Clock
@@ -19,25 +19,33 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.node.inlet import Inlet
-from xb_muscle_ros.node.inputs import Scale
+from xb_muscle_ros.node.inlet_many import InletOfMany
 from xb_muscle_ros.node.lockstep import Lockstep
-from xb_muscle_ros.node.outputs import OutputMessages
+from xb_muscle_ros.node.lockstep_many import LockstepMany, scale_of
+from xb_muscle_ros.node.memory import lock_memory, unlock_memory
+from xb_muscle_ros.node.outputs import OutputMessages, OutputMessagesMany
 from xb_muscle_ros.node.parameter_gate import ParameterGate
+from xb_muscle_ros.node.priority import drop_priority, take_priority
 from xb_muscle_ros.node.realtime import Realtime, Settings
+from xb_muscle_ros.node.realtime_many import RealtimeMany
 from xb_muscle_ros.node.reporter import Reporter
-from xb_muscle_ros.node.saved_state import Stepping, load_state, save_state
+from xb_muscle_ros.node.saved_state import load_state, load_states, save_state, save_states
+from xb_muscle_ros.node.several import enumerated
 
 _DEEP = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
 _NEWEST = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
 # A lost sample breaks lockstep; in realtime an old one is worth less than none.
 _INPUT_QOS = {"lockstep": _DEEP, "realtime": _NEWEST}
 
+_Many = LockstepMany | RealtimeMany
+
 
 class MuscleNode(LifecycleNode):
-    """One fibre on the ROS graph.
+    """One fibre on the ROS graph, or many that share topics and ticks.
 
     Attributes:
         finished: whether the lifecycle has come to its end.
@@ -55,8 +63,8 @@ class MuscleNode(LifecycleNode):
         self.failure: UserError | None = None
         self._gate = ParameterGate(self, self._use_fibre, self._use_settings)
         self._mode: str = self._gate.value("mode")
-        self._stepping: Lockstep | Realtime | None = None
-        self._inlet: Inlet | None = None
+        self._stepping: Lockstep | Realtime | _Many | None = None
+        self._inlet: Inlet | InletOfMany | None = None
         self._entities: list[tuple[Any, Any]] = []
         self._reporter = Reporter(self, self._mode)
         self.create_service(Trigger, "~/reset", self._on_reset)
@@ -87,20 +95,18 @@ class MuscleNode(LifecycleNode):
             self._stepping.stop()
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Build the fibre and connect to the topics."""
+        """Build the fibres and connect to the topics."""
         try:
-            fibre = self._gate.configure()
-            muscle = Muscle(fibre)
-            # The first settling loads what later ones need.
-            muscle.settle(0.0, 0.1)
-            self._connect(fibre, muscle)
+            fibres = self._gate.configure()
+            self._connect(fibres)
         except UserError as error:
             return self._fail(error)
         except Exception as error:
             # rclpy keeps quiet about exceptions in transitions.
             return self._fail(UserError(f"{type(error).__name__}: {error}"))
-        constants = f"1 L0 = {fibre.reference_length_m:g} m, 1 F0 = {fibre.f0_n:g} N"
-        self.get_logger().info(f"fibre {fibre.name}, model {fibre.model}, mode {self._mode}; {constants}")
+        names = enumerated([fibre.name for fibre in fibres])
+        who = f"fibre {names}" if len(fibres) == 1 else f"{len(fibres)} fibres ({names})"
+        self.get_logger().info(f"{who}, model {fibres[0].model}, mode {self._mode}; {_constants(fibres)}")
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -109,6 +115,12 @@ class MuscleNode(LifecycleNode):
         # What is there now stays; the collector need not look at it again, in the middle of a tick.
         gc.collect()
         gc.freeze()
+        if self._gate.value("lock_memory"):
+            lock_memory(self.get_logger())
+        priority = self._gate.value("realtime_priority")
+        if self._mode == "realtime" and priority > 1:
+            # Whoever holds the interpreter must not be pushed aside while a tick waits for it: callbacks rank next.
+            take_priority(priority - 1, self.get_logger())
         self._set_active(True)
         if self._stepping is not None:
             self._stepping.start()
@@ -121,7 +133,7 @@ class MuscleNode(LifecycleNode):
         return super().on_deactivate(state)
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Forget the fibre and leave the topics."""
+        """Forget the fibres and leave the topics."""
         self._free()
         return super().on_cleanup(state)
 
@@ -138,27 +150,46 @@ class MuscleNode(LifecycleNode):
         self._free()
         return super().on_error(state)
 
-    def _connect(self, fibre: Fibre, muscle: Muscle) -> None:
+    def _connect(self, fibres: Sequence[Fibre]) -> None:
         force, moments = (
             self._outlet(self.create_lifecycle_publisher(JointState, topic, _output_qos(), **_overridable()))
             for topic in ("muscle/force", "muscle/moments")
         )
-        emit = OutputMessages(fibre.name, force, moments).publish
-        scale = _scale(fibre)
-        log = self.get_logger()
-        if self._mode == "lockstep":
-            self._stepping = Lockstep(muscle, scale, emit, log, self._simulated_time)
+        names = [fibre.name for fibre in fibres]
+        stepping: Lockstep | Realtime | _Many
+        inlet: Inlet | InletOfMany
+        if self._gate.many:
+            many = stepping = self._many(fibres, OutputMessagesMany(names, force, moments))
+            inlet = InletOfMany(names, many, self.get_logger())
         else:
-            clock = self.get_clock()
-            self._stepping = Realtime(
-                muscle, scale, self._settings(), emit, lambda: int(clock.now().nanoseconds), log, self._simulated_time
-            )
-        self._inlet = Inlet(fibre.name, self._stepping, log)
+            one = stepping = self._one(fibres[0], OutputMessages(names[0], force, moments))
+            inlet = Inlet(names[0], one, self.get_logger())
+        self._stepping, self._inlet = stepping, inlet
         # Calcium first: where both wait, it is then taken before the length that needs it.
-        for topic, take in (("muscle/calcium", self._inlet.take_calcium), ("muscle/length", self._inlet.take_length)):
+        for topic, take in (("muscle/calcium", inlet.take_calcium), ("muscle/length", inlet.take_length)):
             made = self.create_subscription(JointState, topic, take, _INPUT_QOS[self._mode], **_overridable())
             self._entities.append((made, self.destroy_subscription))
-        self._reporter.watch(fibre, self._stepping, self._inlet)
+        self._reporter.watch(fibres, stepping, inlet)
+
+    def _one(self, fibre: Fibre, messages: OutputMessages) -> Lockstep | Realtime:
+        muscle = Muscle(fibre)
+        # The first settling loads what later ones need.
+        muscle.settle(0.0, 0.1)
+        scale, log = scale_of(fibre), self.get_logger()
+        if self._mode == "lockstep":
+            return Lockstep(muscle, scale, messages.publish, log, self._simulated_time)
+        return Realtime(muscle, scale, self._settings(), messages.publish, self._now_ns, log, self._simulated_time)
+
+    def _many(self, fibres: Sequence[Fibre], messages: OutputMessagesMany) -> _Many:
+        batch = MuscleBatch(fibres)
+        batch.muscles[0].settle(0.0, 0.1)
+        log = self.get_logger()
+        if self._mode == "lockstep":
+            return LockstepMany(batch, messages.publish, log, self._simulated_time, self._gate.value("threads"))
+        return RealtimeMany(batch, self._settings(), messages.publish, self._now_ns, log, self._simulated_time)
+
+    def _now_ns(self) -> int:
+        return int(self.get_clock().now().nanoseconds)
 
     def _outlet(self, publisher: Any) -> Any:
         self._entities.append((publisher, self.destroy_lifecycle_publisher))
@@ -174,6 +205,9 @@ class MuscleNode(LifecycleNode):
         if self._stepping is not None:
             self._stepping.stop()
         gc.unfreeze()
+        drop_priority()
+        if self._gate.value("lock_memory"):
+            unlock_memory()
 
     def _free(self) -> None:
         for entity, destroy in self._entities:
@@ -198,39 +232,44 @@ class MuscleNode(LifecycleNode):
         return Settings(*(self._gate.value(name) for name in Settings._fields))
 
     def _use_settings(self) -> None:
-        if isinstance(self._stepping, Realtime):
+        if isinstance(self._stepping, (Realtime, RealtimeMany)):
             self._stepping.settings = self._settings()
+        elif isinstance(self._stepping, LockstepMany):
+            self._stepping.threads = self._gate.value("threads")
 
-    def _use_fibre(self, fibre: Fibre) -> None:
-        if self._stepping is not None:
+    def _use_fibre(self, index: int, fibre: Fibre) -> None:
+        if isinstance(self._stepping, _Many):
+            self._stepping.replace(index, fibre)
+        elif self._stepping is not None:
             # One assignment: a tick sees the old set or the new one, never a mixture.
             self._stepping.muscle = Muscle(fibre)
-            self._stepping.next_scale = _scale(fibre)
+            self._stepping.next_scale = scale_of(fibre)
 
     def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        if self._stepping is None or self._gate.fibre is None:
+        if self._stepping is None:
             response.message = "the node is not configured; there is nothing to reset"
             return response
         account = self._stepping.reset()
-        scale = _scale(self._gate.fibre)
         response.success = True
-        response.message = (
-            f"state forgotten after {account}; the next length sample settles anew; "
-            f"1 L0 = {scale.reference_length_m:g} m, 1 F0 = {scale.f0_n:g} N"
-        )
+        constants = _constants([*self._gate.fibres.values()])
+        response.message = f"state forgotten after {account}; the next length sample settles anew; {constants}"
         return response
 
     def _on_save(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._keep(save_state, response)
+        return self._keep(response, load=False)
 
     def _on_load(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._keep(load_state, response)
+        return self._keep(response, load=True)
 
-    def _keep(self, act: Callable[[str, str, Stepping], str], response: Trigger.Response) -> Trigger.Response:
+    def _keep(self, response: Trigger.Response, load: bool) -> Trigger.Response:
+        file = self._gate.value("state_file")
         try:
             if self._stepping is None:
                 raise UserError("the node is not configured; configure it first")
-            response.message = act(self._gate.value("state_file"), self._mode, self._stepping)
+            if isinstance(self._stepping, _Many):
+                response.message = (load_states if load else save_states)(file, self._mode, self._stepping)
+            else:
+                response.message = (load_state if load else save_state)(file, self._mode, self._stepping)
             response.success = True
             self.get_logger().info(response.message)
         except UserError as error:
@@ -258,8 +297,13 @@ class MuscleNode(LifecycleNode):
         service.callback = safely
 
 
-def _scale(fibre: Fibre) -> Scale:
-    return Scale(fibre.reference_length_m, fibre.f0_n)
+def _constants(fibres: Sequence[Fibre]) -> str:
+    """One L0 and one F0 in words; of many fibres only where they have the same."""
+    found = {(fibre.reference_length_m, fibre.f0_n) for fibre in fibres}
+    if len(found) > 1:
+        return "L0 and F0 differ between fibres"
+    length, force = found.pop()
+    return f"1 L0 = {length:g} m, 1 F0 = {force:g} N"
 
 
 def _output_qos() -> QoSProfile:

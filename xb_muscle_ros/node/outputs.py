@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import MutableSequence
+from collections.abc import MutableSequence, Sequence
 from typing import Any, Protocol
 
+import numpy as np
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.models.muscle import Outputs
 from xb_muscle_ros.node.inputs import Scale
+from xb_muscle_ros.node.several import Floats, Indices
 from xb_muscle_ros.trials.simulated import MOMENTS
 
 
@@ -67,3 +69,71 @@ class OutputMessages:
             for i in range(len(MOMENTS)):
                 self._values[i] = outputs[first + i]
             self._to_moments.publish(self._moments)
+
+
+_FORCE, _CE_LENGTH, _CE_VELOCITY = (
+    Outputs._fields.index(name) for name in ("force_f0", "ce_length_change_l0", "ce_velocity_l0_per_s")
+)
+_MOMENTS = slice(Outputs._fields.index(MOMENTS[0]), Outputs._fields.index(MOMENTS[0]) + len(MOMENTS))
+
+
+class OutputMessagesMany:
+    """Publishes forces and moments of many fibres, all in one message each; see `OutputMessages`."""
+
+    def __init__(self, fibres: Sequence[str], force: Publisher, moments: Publisher) -> None:
+        self._names = list(fibres)
+        self._to_force = force
+        self._to_moments = moments
+        self._all = _Pair(self._names)
+
+    def publish(self, stamp_ns: int, which: Indices | None, outputs: Floats, scales: Floats) -> None:
+        """Send the outputs of one moment.
+
+        Args:
+            stamp_ns: of the messages.
+            which: fibres; None: all, in order.
+            outputs: shape (fibres, 11), a column for each name of `Outputs`.
+            scales: shape (fibres, 2), one L0 (m) and one F0 (N).
+        """
+        pair = self._all if which is None else _Pair([self._names[i] for i in which.tolist()])
+        pair.fill(stamp_ns, outputs, scales)
+        self._to_force.publish(pair.force)
+        if self._to_moments.get_subscription_count():
+            pair.fill_moments(stamp_ns, outputs)
+            self._to_moments.publish(pair.moments)
+
+
+class _Pair:
+    """Messages for some fibres, filled in place."""
+
+    def __init__(self, fibres: Sequence[str]) -> None:
+        self.force, self.moments = JointState(), JointState()
+        self.force.name = list(fibres)
+        self.moments.name = [f"{fibre}/{name}" for fibre in fibres for name in MOMENTS]
+        self._position, self._velocity, self._effort = (
+            _array(self.force, field, len(fibres)) for field in ("position", "velocity", "effort")
+        )
+        self._values = _array(self.moments, "position", len(self.moments.name))
+
+    def fill(self, stamp_ns: int, outputs: Floats, scales: Floats) -> None:
+        """Put forces in, and the contractile elements' lengths and velocities, with the arithmetic of one fibre."""
+        _set_stamp(self.force, stamp_ns)
+        reference, f0 = scales[:, 0], scales[:, 1]
+        np.multiply(outputs[:, _FORCE], f0, out=self._effort)
+        np.multiply(reference, 1.0 + outputs[:, _CE_LENGTH], out=self._position)
+        np.multiply(reference, outputs[:, _CE_VELOCITY], out=self._velocity)
+
+    def fill_moments(self, stamp_ns: int, outputs: Floats) -> None:
+        """Put the moments in."""
+        _set_stamp(self.moments, stamp_ns)
+        self._values[:] = outputs[:, _MOMENTS].ravel()
+
+
+def _set_stamp(message: JointState, stamp_ns: int) -> None:
+    stamp = message.header.stamp
+    stamp.sec, stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
+
+
+def _array(message: JointState, field: str, size: int) -> Floats:
+    """`room` as an array of NumPy on the same memory."""
+    return np.frombuffer(room(message, field, size), dtype=np.float64)  # type: ignore[call-overload, no-any-return, unused-ignore]

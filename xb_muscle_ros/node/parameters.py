@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -11,9 +11,10 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS
+from xb_muscle_ros.node.configuration import GROUPS
 from xb_muscle_ros.node.watchdog import DECAY, HOLD, ISOMETRIC
 
-Value = bool | int | float | str
+Value = bool | int | float | str | tuple[str, ...]
 
 # When a parameter may be set: at the start of the process only, unconfigured, anything but active, at any time.
 START, UNCONFIGURED, INACTIVE, ALWAYS = "at the start only", "when unconfigured", "when not active", "at any time"
@@ -42,6 +43,11 @@ NODE_PARAMETERS: Mapping[str, Row] = MappingProxyType(
             choices=("realtime", "lockstep"),
         ),
         "fiber_file": Row("", "", "fibre file, path or packaged fibre name; empty: parameters hold it", UNCONFIGURED),
+        "fiber_files": Row(
+            ("",), "", "one fibre file for each of many fibres, in order; empty: not many", UNCONFIGURED
+        ),
+        "fibers": Row(("",), "", "names of many fibres, as in the messages; empty: those of fiber_files", UNCONFIGURED),
+        "threads": Row(1, "", "threads that step many fibres, at most one for each core", INACTIVE, 1, 256),
         "rate_hz": Row(1000.0, "Hz", "steps per second in realtime mode", INACTIVE, 10.0, 10000.0),
         "extrapolate": Row(
             False, "", "between length samples go on with their velocity instead of holding the length", ALWAYS
@@ -68,9 +74,16 @@ NODE_PARAMETERS: Mapping[str, Row] = MappingProxyType(
             choices=(HOLD, ISOMETRIC, DECAY),
         ),
         "decay_s": Row(0.1, "s", "time constant of calcium with on_timeout decay", ALWAYS, 0.001, 1000.0),
+        "realtime_priority": Row(
+            0, "", "priority of the ticks' thread under SCHED_FIFO, where permitted; 0: ordinary", INACTIVE, 0, 99
+        ),
+        "lock_memory": Row(False, "", "keep the process in memory while active, where permitted", INACTIVE),
         "state_file": Row("", "", "file that ~/save_state writes and ~/load_state reads", ALWAYS),
     }
 )
+
+# A state is of its grid: with another it would mean something else, or not fit.
+OF_GRIDS = ("bins", "strain_range")
 
 TEXTS: Mapping[str, str] = MappingProxyType(
     {
@@ -84,7 +97,7 @@ TEXTS: Mapping[str, str] = MappingProxyType(
 
 def is_text(name: str) -> bool:
     """Whether a parameter of the fibre is text and no number."""
-    return name in TEXTS or name.startswith("sources.")
+    return name in TEXTS or name.startswith("sources.") or name.endswith(".source")
 
 
 # Parameters that rclpy itself declares.
@@ -102,13 +115,19 @@ def is_foreign(name: str) -> bool:
 
 
 def check_node_parameter(name: str, value: object) -> Value:
+    """`check_value` for a parameter of the node."""
+    return check_value(name, NODE_PARAMETERS[name], value)
+
+
+def check_value(name: str, row: Row, value: object) -> Value:
     """Return a value of the row's type; whole numbers may stand for floating ones.
 
     Raises:
         UserError: another type, not finite, out of range, or not among the choices.
     """
-    row = NODE_PARAMETERS[name]
     kind = type(row.default)
+    if kind is tuple:
+        return _texts(name, value)
     if kind is float and type(value) is int:
         value = float(value)
     if type(value) is not kind:
@@ -127,6 +146,13 @@ def check_node_parameter(name: str, value: object) -> Value:
     return value
 
 
+def _texts(name: str, value: object) -> tuple[str, ...]:
+    """A list of texts; an empty list has no type in ROS and reads as one empty text."""
+    if isinstance(value, Sequence) and not isinstance(value, str) and all(isinstance(text, str) for text in value):
+        return tuple(value) or ("",)
+    raise UserError(f"parameter '{name}' is {value!r}; it takes a list of texts, for example ['left', 'right']")
+
+
 _KINDS = {bool: "bool", int: "whole number", float: "number", str: "text"}
 
 
@@ -138,7 +164,11 @@ def unknown(name: str, declared: Iterable[str]) -> UserError:
 
 def node_descriptor(name: str) -> ParameterDescriptor:
     """Descriptor of a parameter of the node."""
-    row = NODE_PARAMETERS[name]
+    return row_descriptor(NODE_PARAMETERS[name])
+
+
+def row_descriptor(row: Row) -> ParameterDescriptor:
+    """Descriptor of a parameter that a row describes."""
     unit = f" [{row.unit}]" if row.unit else ""
     descriptor = ParameterDescriptor(description=f"{row.meaning}{unit}; set {row.when}", read_only=row.when == START)
     if row.choices:
@@ -156,8 +186,13 @@ def fibre_descriptor(name: str) -> ParameterDescriptor:
         meaning = TEXTS.get(name, "where the values of the set come from")
         return ParameterDescriptor(description=f"{meaning}; set {UNCONFIGURED}")
     head, _, rest = name.partition(".")
+    if head not in GROUPS and rest:
+        # One of many fibres.
+        return fibre_descriptor(rest)
     table, key = (CONSTANTS, rest) if head == "constants" else (PARAMETERS, rest.rpartition(".")[2])
-    when = "takes effect at the next reset" if head == "constants" else f"set {ALWAYS}"
+    when = f"set {UNCONFIGURED if key in OF_GRIDS else ALWAYS}"
+    if head == "constants":
+        when = "takes effect at the next reset"
     if key not in table:
         raise UserError(f"parameter '{name}' is not known{suggest(key, table)}")
     row = table[key]

@@ -36,21 +36,28 @@ def child_environment(domain_id: int) -> dict[str, str]:
 
 
 class NodeProcess:
-    """``muscle_node`` as a child process; ends with the ``with`` block.
+    """``muscle_node``, or another node of this package, as a child process; ends with the ``with`` block.
 
     Attributes:
         process: the child.
     """
 
-    def __init__(self, domain_id: int, parameters: Mapping[str, object], arguments: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        domain_id: int,
+        parameters: Mapping[str, object],
+        arguments: Sequence[str] = (),
+        module: str = "xb_muscle_ros.node.main",
+    ) -> None:
         """Start the node.
 
         Args:
             domain_id: of ROS.
             parameters: of the node; text, numbers and truth values.
             arguments: further ROS arguments.
+            module: of the node.
         """
-        command = [sys.executable, "-m", "xb_muscle_ros.node.main", "--ros-args", *arguments]
+        command = [sys.executable, "-m", module, "--ros-args", *arguments]
         for name, value in parameters.items():
             text = str(value).lower() if isinstance(value, bool) else str(value)
             command += ["-p", f"{name}:={text}"]

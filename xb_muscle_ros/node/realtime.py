@@ -1,9 +1,7 @@
-"""Realtime: one step per period of the steady clock, in a thread of its own, so that messages do not delay ticks."""
+"""Realtime: one step per period of the steady clock, whatever messages come and when."""
 
 from __future__ import annotations
 
-import sys
-import threading
 import time
 from collections.abc import Callable
 from typing import NamedTuple
@@ -23,18 +21,14 @@ from xb_muscle_ros.node.inputs import (
     length_change_l0,
     went_back,
 )
-from xb_muscle_ros.node.lateness import Lateness
 from xb_muscle_ros.node.lockstep import Emit
 from xb_muscle_ros.node.status import Account, Log, Snapshot, Status, time_went_back
-from xb_muscle_ros.node.waiting import make_waiter
+from xb_muscle_ros.node.ticker import Ticker
 from xb_muscle_ros.node.watchdog import Watchdog, unfed
-
-# How long another thread may keep the interpreter while a tick waits for it (the default is 5 ms).
-_SWITCH_INTERVAL_S = 1e-4
 
 
 class Settings(NamedTuple):
-    """How the clock drives the fibre; all but the rate may change between ticks."""
+    """How the clock drives the fibre; all but rate, priority and threads may change between ticks."""
 
     rate_hz: float
     extrapolate: bool
@@ -43,6 +37,8 @@ class Settings(NamedTuple):
     timeout_s: float
     on_timeout: str
     decay_s: float
+    realtime_priority: int = 0
+    threads: int = 1
 
 
 class _Length(NamedTuple):
@@ -92,8 +88,7 @@ class Realtime:
         self._clock_ns = clock_ns
         self._log = log
         self._simulated_time = simulated_time
-        self._thread: threading.Thread | None = None
-        self._stop = False
+        self._ticker = Ticker(self._ready, self._tick, self._done)
         self._ticks = 0
         self._violations = 0
         self._calcium: float | None = None
@@ -103,19 +98,16 @@ class Realtime:
 
     def start(self) -> None:
         """Start the thread."""
-        self._stop = False
-        self._switch_interval = sys.getswitchinterval()
-        sys.setswitchinterval(_SWITCH_INTERVAL_S)
-        self._thread = threading.Thread(target=self._run, name="ticks", daemon=True)
-        self._thread.start()
+        settings = self.settings
+        period = round(1e9 / settings.rate_hz)
+        self._dt = period * 1e-9
+        self._ticker.start(
+            period, lambda: self.settings.max_catch_up, settings.realtime_priority, self._log, lambda: None
+        )
 
     def stop(self) -> None:
         """End the thread at its next tick, and wait for that."""
-        if self._thread is not None:
-            self._stop = True
-            self._thread.join()
-            self._thread = None
-            sys.setswitchinterval(self._switch_interval)
+        self._ticker.stop()
 
     def reset(self) -> Account:
         """Forget state and stamps and start the statistics anew; the next length sample settles anew.
@@ -129,7 +121,7 @@ class Realtime:
         self._scale = self.next_scale
         # The thread takes the rest up at its next tick.
         self._reset = True
-        if self._thread is None:
+        if not self._ticker.running:
             self._begin_anew()
         return account
 
@@ -152,7 +144,7 @@ class Realtime:
 
         Stamps begin anew, whatever they were; the thread pauses for this.
         """
-        running = self._thread is not None
+        running = self._ticker.running
         self.stop()
         self.reset()
         self._account = snapshot.account
@@ -206,9 +198,9 @@ class Realtime:
             self._violations,
             self._fault,
             waiting,
-            self._lateness.summary(),
-            self._overruns,
-            self._dropped,
+            self._ticker.lateness.summary(),
+            self._ticker.overruns,
+            self._ticker.dropped,
             self.settings.on_timeout if self._watchdog.barking and self._state is not None else "",
             self._watchdog.timeouts,
         )
@@ -224,39 +216,21 @@ class Realtime:
         self._scale_out = self._scale
         self._state = None
         self._fault = ""
-        self._lateness = Lateness()
+        self._ticker.forget()
         self._watchdog = Watchdog(self._log)
-        self._overruns = 0
-        self._dropped = 0
 
-    def _run(self) -> None:
-        wait = make_waiter()
-        period = round(1e9 / self.settings.rate_hz)
-        self._dt = period * 1e-9
-        # While inactive no sample could come; its age counts from here.
-        self._begun_ns = time.monotonic_ns()
-        deadline = self._begun_ns + period
-        while not self._stop:
-            wait(deadline)
-            if self._reset:
-                self._begin_anew()
-            if self._state is None or self._fault:
-                self._settle()
-                # Settling takes as long as it takes; ticks count from its end.
-                deadline = time.monotonic_ns() + period
-                continue
-            late = time.monotonic_ns() - deadline
-            missed = late // period
-            made_up = min(missed, self.settings.max_catch_up)
-            self._overruns += missed
-            self._dropped += missed - made_up
-            for i in range(made_up + 1):
-                self._lateness.note(late - i * period)
-                self._tick(deadline + i * period)
-            if not self._fault and not self._reset:
-                # Of ticks made up for only the newest is worth sending.
-                self._emit(self._clock_ns(), self.muscle.outputs(self._state), self._scale_out)
-            deadline += (missed + 1) * period
+    def _ready(self) -> bool:
+        if self._reset:
+            self._begin_anew()
+        if self._state is None or self._fault:
+            self._settle()
+            return False
+        return True
+
+    def _done(self) -> None:
+        if self._state is not None and not self._fault and not self._reset:
+            # Of ticks made up for only the newest is worth sending.
+            self._emit(self._clock_ns(), self.muscle.outputs(self._state), self._scale_out)
 
     def _settle(self) -> None:
         length, calcium = self._length, self._calcium
@@ -273,7 +247,7 @@ class Realtime:
         if self._reset or self._fault or self._state is None or length is None or calcium is None:
             return
         settings = self.settings
-        fed_ns = max(length.arrival_ns, self._begun_ns)
+        fed_ns = max(length.arrival_ns, self._ticker.begun_ns)
         overdue_s = self._watchdog.overdue_s(fed_ns, deadline_ns, settings.timeout_s, settings.on_timeout)
         if overdue_s > 0.0:
             model = float(self._state[-3])

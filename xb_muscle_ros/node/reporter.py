@@ -3,15 +3,33 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, Protocol
 
 from diagnostic_msgs.msg import DiagnosticArray
 
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.node.diagnostics import Report, diagnostics
-from xb_muscle_ros.node.inlet import Inlet
-from xb_muscle_ros.node.lockstep import Lockstep
-from xb_muscle_ros.node.realtime import Realtime
+from xb_muscle_ros.node.inputs import Counts
+from xb_muscle_ros.node.several import enumerated
+from xb_muscle_ros.node.status import Status
+
+
+class Stepping(Protocol):
+    """What is reported of the stepping."""
+
+    counts: Counts
+
+    def status(self) -> Status:
+        """How it goes."""
+
+
+class Inlet(Protocol):
+    """What is reported of the input."""
+
+    refused: Counts
+    ignored_names: int
+    last_length_s: float | None
 
 
 class Reporter:
@@ -22,13 +40,14 @@ class Reporter:
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._mode = mode
         self._report = Report(node.get_fully_qualified_name(), mode, "unconfigured")
-        self._stepping: Lockstep | Realtime | None = None
+        self._stepping: Stepping | None = None
         self._inlet: Inlet | None = None
         self._last = (time.monotonic(), time.process_time(), 0, 0, 0)
 
-    def watch(self, fibre: Fibre, stepping: Lockstep | Realtime, inlet: Inlet) -> None:
+    def watch(self, fibres: Sequence[Fibre], stepping: Stepping, inlet: Inlet) -> None:
         """Report on these from now on."""
-        self._report.fibre, self._report.model = fibre.name, fibre.model
+        self._report.fibre = enumerated([fibre.name for fibre in fibres])
+        self._report.fibres, self._report.model = len(fibres), fibres[0].model
         self._stepping, self._inlet = stepping, inlet
         self._report.refused, self._report.odd = inlet.refused, stepping.counts
 

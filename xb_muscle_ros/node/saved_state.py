@@ -1,10 +1,10 @@
-"""A fibre's state in a file, so that another process can go on with it to the bit."""
+"""The state of one fibre or many in a file, so that another process can go on with it to the bit."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn, Protocol
 
@@ -18,6 +18,7 @@ from xb_muscle_ros.node.inputs import Scale
 from xb_muscle_ros.node.status import Account, Snapshot
 
 FORMAT = "xb_muscle_ros state 1"
+FORMAT_OF_MANY = "xb_muscle_ros states 1"
 
 
 class Stepping(Protocol):
@@ -29,6 +30,20 @@ class Stepping(Protocol):
         """What is needed to go on."""
 
     def load(self, snapshot: Snapshot) -> None:
+        """Go on with it."""
+
+
+class SteppingOfMany(Protocol):
+    """What both modes can do for many fibres."""
+
+    @property
+    def muscles(self) -> Sequence[Muscle]:
+        """One for each fibre."""
+
+    def save(self) -> Sequence[Snapshot]:
+        """What is needed to go on, for each fibre."""
+
+    def load(self, snapshots: Sequence[Snapshot]) -> None:
         """Go on with it."""
 
 
@@ -47,22 +62,7 @@ def save_state(state_file: str, mode: str, stepping: Stepping) -> str:
     """
     path = _path(state_file)
     muscle, snapshot = stepping.muscle, stepping.save()
-    tree = {
-        "format": FORMAT,
-        "version": __version__,
-        **_identity(muscle, mode),
-        "parameters": _parameters(muscle),
-        "state": dict(zip(muscle.state_names, snapshot.state.tolist(), strict=True)),
-        "scale": snapshot.scale._asdict(),
-        "calcium_ns_um": snapshot.calcium,
-        "stamp_ns": snapshot.stamp,
-        "asked_ns": snapshot.asked,
-        "taken": snapshot.account._asdict(),
-    }
-    try:
-        write_text(path, json.dumps(tree, indent=1) + "\n")
-    except (OSError, ValueError) as error:
-        raise UserError(f"state file {path} cannot be written: {error}; set parameter 'state_file'") from error
+    _write(path, {"format": FORMAT, "version": __version__, **_tree(muscle, mode, snapshot)})
     return f"state of fibre {muscle.fibre.name} saved to {path} after {snapshot.account}"
 
 
@@ -78,7 +78,59 @@ def load_state(state_file: str, mode: str, stepping: Stepping) -> str:
     """
     path = _path(state_file)
     muscle = stepping.muscle
-    tree = _read(path)
+    tree = _read(path, FORMAT)
+    snapshot = _checked(path, tree, muscle, mode)
+    stepping.load(snapshot)
+    done = f"state of fibre {muscle.fibre.name} loaded from {path}, saved after {snapshot.account}"
+    return done + _other_version(tree)
+
+
+def save_states(state_file: str, mode: str, stepping: SteppingOfMany) -> str:
+    """As `save_state`, for all fibres of a node in one file."""
+    path = _path(state_file)
+    muscles, snapshots = stepping.muscles, stepping.save()
+    trees = [_tree(muscle, mode, snapshot) for muscle, snapshot in zip(muscles, snapshots, strict=True)]
+    _write(path, {"format": FORMAT_OF_MANY, "version": __version__, "fibres": trees})
+    return f"states of {len(trees)} fibres saved to {path}"
+
+
+def load_states(state_file: str, mode: str, stepping: SteppingOfMany) -> str:
+    """As `load_state`, for all fibres of a node, or for none where one does not fit."""
+    path = _path(state_file)
+    muscles = stepping.muscles
+    tree = _read(path, FORMAT_OF_MANY)
+    trees = tree.get("fibres")
+    if not isinstance(trees, list) or not all(isinstance(entry, dict) for entry in trees):
+        _damaged(path, "it has no list of fibres")
+    found, own = [entry.get("fibre") for entry in trees], [muscle.fibre.name for muscle in muscles]
+    _same(path, "fibres", found, own, "load it into a node that has the same, in the same order")
+    snapshots = [_checked(path, entry, muscle, mode) for entry, muscle in zip(trees, muscles, strict=True)]
+    stepping.load(snapshots)
+    return f"states of {len(trees)} fibres loaded from {path}" + _other_version(tree)
+
+
+def _write(path: Path, tree: Mapping[str, object]) -> None:
+    try:
+        write_text(path, json.dumps(tree, indent=1) + "\n")
+    except (OSError, ValueError) as error:
+        raise UserError(f"state file {path} cannot be written: {error}; set parameter 'state_file'") from error
+
+
+def _tree(muscle: Muscle, mode: str, snapshot: Snapshot) -> dict[str, object]:
+    return {
+        **_identity(muscle, mode),
+        "parameters": _parameters(muscle),
+        "state": dict(zip(muscle.state_names, snapshot.state.tolist(), strict=True)),
+        "scale": snapshot.scale._asdict(),
+        "calcium_ns_um": snapshot.calcium,
+        "stamp_ns": snapshot.stamp,
+        "asked_ns": snapshot.asked,
+        "taken": snapshot.account._asdict(),
+    }
+
+
+def _checked(path: Path, tree: Mapping[str, Any], muscle: Muscle, mode: str) -> Snapshot:
+    """Snapshot of a fibre, if it is of this one."""
     for what, own in _identity(muscle, mode).items():
         _same(path, what, tree.get(what), own, "load it into a node that has the same")
     own_values, values = _parameters(muscle), tree.get("parameters")
@@ -86,12 +138,13 @@ def load_state(state_file: str, mode: str, stepping: Stepping) -> str:
         _damaged(path, "its parameters are not those of the model")
     for name, value in own_values.items():
         _same(path, name, values[name], value, "set the parameter to the file's value first")
-    snapshot = _snapshot(path, tree, muscle.state_names, lockstep=mode == "lockstep")
-    stepping.load(snapshot)
-    done = f"state of fibre {muscle.fibre.name} loaded from {path}, saved after {snapshot.account}"
-    if tree.get("version") != __version__:
-        done += f", by version {tree.get('version')}; this is {__version__}, whose forces may differ"
-    return done
+    return _snapshot(path, tree, muscle.state_names, lockstep=mode == "lockstep")
+
+
+def _other_version(tree: Mapping[str, Any]) -> str:
+    if tree.get("version") == __version__:
+        return ""
+    return f", by version {tree.get('version')}; this is {__version__}, whose forces may differ"
 
 
 def _path(state_file: str) -> Path:
@@ -122,7 +175,7 @@ def _same(path: Path, what: str, found: object, own: object, remedy: str) -> Non
         raise UserError(f"state file {path} has {what} = {found}, this node has {own}; {remedy}")
 
 
-def _read(path: Path) -> Mapping[str, Any]:
+def _read(path: Path, wanted: str) -> Mapping[str, Any]:
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -130,9 +183,9 @@ def _read(path: Path) -> Mapping[str, Any]:
     except ValueError as error:
         raise UserError(f"state file {path} is not JSON: {error}; give a file that ~/save_state wrote") from error
     found = tree.get("format") if isinstance(tree, dict) else None
-    if found != FORMAT:
+    if found != wanted:
         raise UserError(
-            f"state file {path} has format {found!r}, known is '{FORMAT}'; give one that ~/save_state wrote"
+            f"state file {path} has format {found!r}, known is '{wanted}'; give one that ~/save_state wrote"
         )
     assert isinstance(tree, dict)
     return tree

@@ -1,16 +1,23 @@
-"""How well a realtime node keeps time on this machine."""
+"""How well a node keeps time on this machine: lateness of ticks, and the way from length to force and back."""
+
+# mypy: allow-untyped-calls
 
 from __future__ import annotations
 
 import math
+import os
 import threading
 import time
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.node.inputs import stamp_ns
 from xb_muscle_ros.node.link import Link
 from xb_muscle_ros.node.outputs import room
 from xb_muscle_ros.node.process import NodeProcess, private_domain
@@ -18,6 +25,8 @@ from xb_muscle_ros.node.waiting import make_waiter
 
 _INPUT_HZ = 500.0
 _START_S = 60.0
+PLAIN = "xb_muscle_ros.bench.plain_timer"
+"""Module of the node with an executor's timer that ours is held against."""
 _KEYS = {
     "ticks since reset": "ticks",
     "lateness p50 (µs)": "lateness_p50_us",
@@ -31,52 +40,250 @@ _KEYS = {
 }
 
 
-def run_timing(duration_s: float, rate_hz: float, fibre: str = "18Dec2017a") -> dict[str, float]:
+def run_timing(
+    duration_s: float, rate_hz: float, fibre: str = "18Dec2017a", fibres: int = 1, settings: Mapping[str, object] = {}
+) -> dict[str, float]:
     """Measure a realtime node in its own process, fed with length at 500 Hz and with calcium.
 
     Args:
         duration_s: time measured, s; statistics start anew once the node is stepping.
         rate_hz: of the node.
         fibre: packaged fibre or file.
+        fibres: how many the node has, all of the same file.
+        settings: further parameters of the node.
 
     Returns:
         ``lateness_p50_us``, ``_p99_us``, ``_p99.9_us``, ``_max_us``, ``overruns``, ``dropped_ticks``, ``ticks``,
-        ``rate_hz`` (ticks per second reached), ``cpu_share`` (of one core, mean), ``state_violations``, ``refused``.
+        ``rate_hz`` (ticks per second reached), ``cpu_share`` (of one core, mean), ``state_violations``, ``refused``,
+        ``load`` (processes that ran or waited to, mean of the system's one-minute average).
 
     Raises:
         UserError: the node did not start or did not answer.
     """
     domain = private_domain()
-    parameters = {"fiber_file": fibre, "mode": "realtime", "rate_hz": float(rate_hz)}
+    parameters = {**_parameters(fibre, fibres, "realtime", rate_hz), **settings}
     with NodeProcess(domain, parameters) as child, Link("timing", domain_id=domain) as link:
-        reports: list[dict[str, str]] = []
-        diagnostics = link.node.create_subscription(
-            DiagnosticArray, "/diagnostics", lambda message: reports.extend(_reports(message, link.peer)), 10
+        return _measure([_Measured(link, child)], duration_s, names(fibres))[0]
+
+
+def run_beside_plain_timer(
+    duration_s: float, rate_hz: float, fibre: str = "18Dec2017a", settings: Mapping[str, object] = {}
+) -> tuple[dict[str, float], dict[str, float]]:
+    """As `run_timing`, with a node at the same time that steps the same fibre in a timer of rclpy's default executor.
+
+    Returns figures of ours and of that node; both hear the same messages.
+    """
+    domain = private_domain()
+    parameters = {**_parameters(fibre, 1, "realtime", rate_hz), **settings}
+    plain = {"fiber_file": fibre, "rate_hz": float(rate_hz)}
+    with (
+        NodeProcess(domain, parameters) as ours,
+        NodeProcess(domain, plain, ["-r", "__ns:=/plain"], module=PLAIN) as theirs,
+        Link("timing", domain_id=domain) as near,
+        Link("timing", "/plain", domain) as far,
+    ):
+        first, second = _measure([_Measured(near, ours), _Measured(far, theirs)], duration_s, names(1))
+    return first, second
+
+
+def run_roundtrip(duration_s: float, rate_hz: float, fibre: str = "18Dec2017a", fibres: int = 1) -> dict[str, float]:
+    """Measure the way from a length message to its force and back, with a node in lockstep and one message at a time.
+
+    Args:
+        duration_s: time measured, s.
+        rate_hz: length messages per second, at absolute deadlines; one whose predecessor is not answered yet waits.
+        fibre: packaged fibre or file.
+        fibres: how many the node has, all in each message.
+
+    Returns:
+        ``p50_us``, ``p99_us``, ``p99.9_us``, ``max_us``; ``first_us``, ``last_us``: medians of first and last quarter;
+        ``behind``: messages sent after the deadline of the next; ``rate_hz`` reached; ``cpu_share`` of the
+        node; ``load`` as in `run_timing`.
+
+    Raises:
+        UserError: the node did not start, or left a message unanswered for 10 s.
+    """
+    domain = private_domain()
+    with (
+        NodeProcess(domain, _parameters(fibre, fibres, "lockstep", rate_hz)) as child,
+        Link("timing", domain_id=domain) as link,
+    ):
+        measured = _Measured(link, child)
+        pinger = _Pinger(link, names(fibres))
+        measured.find()
+        pinger.meet()
+        loads = [os.getloadavg()[0]]
+        measured.reports.clear()
+        result = pinger.run(duration_s, rate_hz)
+        loads.append(os.getloadavg()[0])
+        shares = [float(report["CPU (share of one core)"]) for report in measured.reports[1:]]
+        measured.close()
+    return {**result, "cpu_share": float(np.mean(shares)), "load": float(np.mean(loads))}
+
+
+def names(fibres: int) -> list[str]:
+    """Names of measured fibres; one alone goes without."""
+    return [] if fibres == 1 else [f"fibre_{i}" for i in range(fibres)]
+
+
+def _parameters(fibre: str, fibres: int, mode: str, rate_hz: float) -> dict[str, object]:
+    given: dict[str, object] = {"fiber_file": fibre, "mode": mode, "rate_hz": float(rate_hz)}
+    if fibres > 1:
+        given["fibers"] = f"[{', '.join(names(fibres))}]"
+    return given
+
+
+class _Measured:
+    """A node and what it says of itself."""
+
+    def __init__(self, link: Link, child: NodeProcess) -> None:
+        self.link = link
+        self.child = child
+        self.reports: list[dict[str, str]] = []
+        self._diagnostics = link.node.create_subscription(
+            DiagnosticArray, "/diagnostics", lambda message: self.reports.extend(_reports(message, link.peer)), 10
         )
+
+    def find(self) -> None:
+        """Wait for the node.
+
+        Raises:
+            UserError: it does not come.
+        """
         try:
-            link.find(_START_S, "see the log")
+            self.link.find(_START_S, "see the log")
         except UserError as error:
-            raise UserError(f"the node to be measured did not start: {child.log() or error}") from error
-        feeder = _Feeder(link.node)
-        try:
+            raise UserError(f"the node to be measured did not start: {self.child.log() or error}") from error
+
+    def stepping(self) -> bool:
+        """Whether it has reported steps."""
+        return bool(self.reports) and float(self.reports[-1]["rate (Hz)"]) > 0.0
+
+    def close(self) -> None:
+        """Listen no more."""
+        self.link.node.destroy_subscription(self._diagnostics)
+
+    def figures(self) -> dict[str, float]:
+        """Of the time since reports were cleared.
+
+        Raises:
+            UserError: too few reports came.
+        """
+        if len(self.reports) < 2:
+            raise UserError(
+                f"only {len(self.reports)} reports came from the node to be measured; measure for 3 s at least"
+            )
+        measured = {key: float(self.reports[-1][name]) for name, key in _KEYS.items()}
+        # The first report reaches back before the reset.
+        later = self.reports[1:]
+        measured["rate_hz"] = sum(float(report["rate (Hz)"]) for report in later) / len(later)
+        measured["cpu_share"] = sum(float(report["CPU (share of one core)"]) for report in later) / len(later)
+        return measured
+
+
+def _measure(nodes: Sequence[_Measured], duration_s: float, fibres: Sequence[str]) -> list[dict[str, float]]:
+    """Feed nodes and read their figures."""
+    for node in nodes:
+        node.find()
+    feeders = [_Feeder(node.link.node, fibres) for node in nodes]
+    loads: list[float] = []
+    try:
+        for feeder in feeders:
             feeder.start()
-            if not link.wait_for(lambda: bool(reports) and float(reports[-1]["rate (Hz)"]) > 0.0, _START_S):
-                raise UserError(f"the node to be measured does not step: {child.log()}")
-            link.reset()
-            reports.clear()
-            begin = time.monotonic()
-            link.wait_for(lambda: time.monotonic() - begin >= duration_s + 1.0, duration_s + 10.0)
-        finally:
+        for node in nodes:
+            if not node.link.wait_for(node.stepping, _START_S):
+                raise UserError(f"the node to be measured does not step: {node.child.log()}")
+        for node in nodes:
+            node.link.reset()
+            node.reports.clear()
+        end = time.monotonic() + duration_s + 1.0
+        while (rest := end - time.monotonic()) > 0.0:
+            for node in nodes:
+                node.link.wait_for(lambda: False, min(0.25, rest))
+            loads.append(os.getloadavg()[0])
+    finally:
+        for feeder in feeders:
             feeder.stop()
-            link.node.destroy_subscription(diagnostics)
-    if len(reports) < 2:
-        raise UserError(f"only {len(reports)} reports came from the node to be measured; measure for 3 s at least")
-    measured = {key: float(reports[-1][name]) for name, key in _KEYS.items()}
-    # The first report reaches back before the reset.
-    later = reports[1:]
-    measured["rate_hz"] = sum(float(report["rate (Hz)"]) for report in later) / len(later)
-    measured["cpu_share"] = sum(float(report["CPU (share of one core)"]) for report in later) / len(later)
-    return measured
+        for node in nodes:
+            node.close()
+    return [{**node.figures(), "load": float(np.mean(loads))} for node in nodes]
+
+
+class _Pinger:
+    """Sends a length, waits for its force."""
+
+    def __init__(self, link: Link, fibres: Sequence[str]) -> None:
+        self._link = link
+        qos = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
+        node = link.node
+        self._length = node.create_publisher(JointState, "muscle/length", qos)
+        self._calcium = node.create_publisher(JointState, "muscle/calcium", qos)
+        self._inlet = node.create_subscription(JointState, "muscle/force", self._on_force, qos)
+        self._message = JointState(name=list(fibres))
+        self._count = max(len(fibres), 1)
+        self._position = room(self._message, "position", self._count)
+        self._answered = (-1, 0)
+
+    def meet(self) -> None:
+        """Until an answer finds its way.
+
+        Raises:
+            UserError: none does.
+        """
+        end = time.monotonic() + _START_S
+        while time.monotonic() < end:
+            self._link.reset()
+            self._send(self._calcium, 0, 5.0)
+            self._send(self._length, 0, 1.0)
+            if self._link.wait_for(lambda: self._answered[0] == 0, 1.0):
+                return
+        raise UserError(f"node {self._link.peer} does not answer length; see its log")
+
+    def run(self, duration_s: float, rate_hz: float) -> dict[str, float]:
+        """Measure."""
+        wait = make_waiter()
+        period = round(1e9 / rate_hz)
+        count = round(duration_s * rate_hz)
+        took = np.zeros(count)
+        behind = 0
+        begin = deadline = time.monotonic_ns()
+        for k in range(count):
+            deadline += period
+            wait(deadline)
+            behind += time.monotonic_ns() - deadline > period
+            stamp = (k + 1) * period
+            value = 1.0 + 0.01 * math.sin(2.0 * math.pi * k / rate_hz)
+            if k % 50 == 0:
+                self._send(self._calcium, stamp - period // 2, 3.0 + 2.5 * math.sin(k))
+            sent = time.monotonic_ns()
+            self._send(self._length, stamp, value)
+            if not self._link.wait_for(lambda stamp=stamp: self._answered[0] == stamp, 10.0):  # type: ignore[misc]
+                raise UserError(f"node {self._link.peer} left the message at {stamp * 1e-9:g} s unanswered")
+            took[k] = (self._answered[1] - sent) * 1e-3
+        seconds = (time.monotonic_ns() - begin) * 1e-9
+        p50, p99, p999 = np.percentile(took, [50, 99, 99.9]).tolist()
+        quarter = max(count // 4, 1)
+        return {
+            "p50_us": p50,
+            "p99_us": p99,
+            "p99.9_us": p999,
+            "max_us": float(took.max()),
+            "first_us": float(np.median(took[:quarter])),
+            "last_us": float(np.median(took[-quarter:])),
+            "behind": float(behind),
+            "rate_hz": count / seconds,
+        }
+
+    def _send(self, publisher: Any, stamp: int, value: float) -> None:
+        header = self._message.header.stamp
+        header.sec, header.nanosec = divmod(stamp, 1_000_000_000)
+        for i in range(self._count):
+            self._position[i] = value
+        publisher.publish(self._message)
+
+    def _on_force(self, message: JointState) -> None:
+        if len(message.effort) == self._count:
+            self._answered = (stamp_ns(message.header.stamp), time.monotonic_ns())
 
 
 def _reports(message: Any, node: str) -> list[dict[str, str]]:
@@ -87,7 +294,8 @@ def _reports(message: Any, node: str) -> list[dict[str, str]]:
 class _Feeder:
     """Publishes a length sine of 1 % of L0 at 1 Hz, and a calcium that moves up and down."""
 
-    def __init__(self, node: Any) -> None:
+    def __init__(self, node: Any, fibres: Sequence[str]) -> None:
+        self._fibres = list(fibres)
         self._length = node.create_publisher(JointState, "muscle/length", 10)
         self._calcium = node.create_publisher(JointState, "muscle/calcium", 10)
         self._clock = node.get_clock()
@@ -106,17 +314,21 @@ class _Feeder:
     def _run(self) -> None:
         wait = make_waiter()
         period = round(1e9 / _INPUT_HZ)
-        message = JointState()
-        position = room(message, "position", 1)
+        message = JointState(name=self._fibres)
+        fibres = range(max(len(self._fibres), 1))
+        position = room(message, "position", len(fibres))
         begin = deadline = time.monotonic_ns()
         count = 0
         while not self._stop.is_set():
             seconds = (deadline - begin) * 1e-9
             message.header.stamp = self._clock.now().to_msg()
             if count % 50 == 0:
-                position[0] = 3.0 + 2.5 * math.sin(2.0 * math.pi * 0.3 * seconds)
+                for i in fibres:
+                    position[i] = 3.0 + 2.5 * math.sin(2.0 * math.pi * 0.3 * seconds)
                 self._calcium.publish(message)
-            position[0] = 1.0 + 0.01 * math.sin(2.0 * math.pi * seconds)
+            length = 1.0 + 0.01 * math.sin(2.0 * math.pi * seconds)
+            for i in fibres:
+                position[i] = length
             self._length.publish(message)
             count += 1
             deadline += period

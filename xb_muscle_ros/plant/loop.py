@@ -82,7 +82,7 @@ def run_knee(
 
     Args:
         fibre: see `run_ankle`.
-        moved_before: the hand that holds the leg first lowers and lifts it, as `_move`.
+        moved_before: the hand that holds the leg first lowers and lifts it, as `move`.
         duration_s: from the release.
         elastic: see `run_ankle`.
     """
@@ -90,7 +90,7 @@ def run_knee(
     bare = None if fibre is None else without_parallel(fibre)
     drive = _drive(plant, bare, plant.constant("tone_nm"), elastic)
     if moved_before:
-        _move(plant, drive)
+        move(plant, drive)
     return couple(plant, bare, drive, None, duration_s, moved_before)
 
 
@@ -98,7 +98,7 @@ def _drive(plant: Plant, fibre: Fibre | None, torque_nm: float, elastic: bool) -
     return OwnDrive(plant, torque_nm) if fibre is None else FibreDrive(plant, fibre, torque_nm, elastic)
 
 
-def _move(plant: Plant, drive: Drive) -> None:
+def move(plant: Plant, drive: Drive) -> None:
     """Lower and lift the leg by `MOVE_RAD` in `MOVE_S` (one smooth cosine), and release it at once."""
     ticks = round(MOVE_S / plant.tick_s)
     for k in range(ticks):

@@ -1,0 +1,161 @@
+"""Bodies and muscles in processes of their own, that die and come back."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+pytest.importorskip("mujoco", reason="needs the extra mujoco")
+
+PLANT = "xb_muscle_ros.plant.plant_node"
+PATIENCE_S = 30.0
+
+
+class Stage:
+    """One domain, processes by name, and what the bodies say of their joints.
+
+    Attributes:
+        joints: time (s) and angle (rad) so far, by namespace.
+    """
+
+    def __init__(self, domain: int) -> None:
+        from xb_muscle_ros.node.link import Link
+
+        self.domain = domain
+        self.link = Link("audience", domain_id=domain)
+        self.processes: dict[str, Any] = {}
+        self.joints: dict[str, list[tuple[float, float]]] = {}
+
+    def muscle(self, space: str, mode: str) -> None:
+        """Start the muscles of a namespace's body."""
+        given = {"fiber_file": "18Dec2017a", "mode": mode, "fibers": "[soleus, tibialis_anterior]", "timeout_s": 0.2}
+        self._start(f"muscle{space}", space, given, "xb_muscle_ros.node.main")
+
+    def plant(self, space: str, mode: str, **given: Any) -> None:
+        """Start a body."""
+        self._start(f"plant{space}", space, {"mode": mode, "timeout_s": 0.5, **given}, PLANT)
+
+    def _start(self, name: str, space: str, given: dict[str, Any], module: str) -> None:
+        from sensor_msgs.msg import JointState
+
+        from xb_muscle_ros.node.process import NodeProcess
+
+        self.processes[name] = NodeProcess(self.domain, given, ["-r", f"__ns:={space}"], module)
+        if space not in self.joints:
+            heard = self.joints[space] = []
+
+            def hear(message: Any) -> None:
+                stamp = message.header.stamp
+                heard.append((stamp.sec + stamp.nanosec * 1e-9, message.position[0]))
+
+            self.link.node.create_subscription(JointState, f"{space}/plant/joint", hear, 1000)
+
+    def kill(self, name: str) -> None:
+        """Without a warning."""
+        process = self.processes.pop(name)
+        process.process.kill()
+        assert process.wait() == -signal.SIGKILL
+
+    def until(self, condition: Callable[[], Any]) -> None:
+        """Wait until something holds."""
+        logs = {name: process.log()[-600:] for name, process in self.processes.items()}
+        assert self.link.wait_for(lambda: bool(condition()), PATIENCE_S), (
+            logs,
+            {s: len(j) for s, j in self.joints.items()},
+        )
+
+    def moves_on(self, space: str, ticks: int = 200) -> None:
+        """A body ticks."""
+        target = len(self.joints[space]) + ticks
+        self.until(lambda: len(self.joints[space]) >= target)
+
+    def log(self, name: str) -> str:
+        """Of a process."""
+        return str(self.processes[name].log())
+
+
+@pytest.fixture
+def stage() -> Iterator[Stage]:
+    """All ends with the test."""
+    try:
+        import rclpy  # noqa: F401
+    except ImportError as error:
+        if os.environ.get("CI"):
+            raise
+        pytest.skip(f"ROS 2 cannot be imported: {error}")
+    from xb_muscle_ros.node.process import private_domain
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        made = Stage(private_domain())
+        yield made
+        for process in made.processes.values():
+            process.stop()
+        made.link.close()
+
+
+def episodes(heard: list[tuple[float, float]]) -> list[list[tuple[float, float]]]:
+    """Whole episodes: each begins at time 0."""
+    starts = [k for k, (time_s, _) in enumerate(heard) if time_s == 0.0]
+    return [heard[a:b] for a, b in itertools.pairwise(starts)]
+
+
+def test_lockstep_survives_the_death_of_either_side_and_namespaces_do_not_mix(stage: Stage) -> None:
+    """Two loops on one graph: one suffers, the other repeats its episodes bit for bit all the while."""
+    for space in ("/a", "/b"):
+        stage.muscle(space, "lockstep")
+        stage.plant(space, "lockstep", duration_s=0.2)
+    for space in ("/a", "/b"):
+        stage.until(lambda space=space: len(episodes(stage.joints[space])) >= 2)
+    stage.kill("muscle/a")
+    stage.until(lambda: "asking again" in stage.log("plant/a") or "waiting" in stage.log("plant/a"))
+    count = len(stage.joints["/a"])
+    stage.moves_on("/b")
+    assert len(stage.joints["/a"]) == count
+    stage.muscle("/a", "lockstep")
+    stage.moves_on("/a", 450)
+    stage.kill("plant/a")
+    stage.moves_on("/b")
+    stage.joints["/a"].clear()
+    stage.plant("/a", "lockstep", duration_s=0.2)
+    stage.until(lambda: len(episodes(stage.joints["/a"])) >= 2)
+    reference = episodes(stage.joints["/b"])[0]
+    assert len(reference) == 200
+    assert len({angle for _, angle in reference}) > 100
+    assert all(episode == reference for episode in episodes(stage.joints["/b"]))
+    assert all(episode == reference for episode in episodes(stage.joints["/a"]))
+    assert "Traceback" not in "".join(stage.log(name) for name in stage.processes)
+
+
+def test_realtime_survives_the_death_of_either_side(stage: Stage) -> None:
+    """The body waits for its muscles, the muscles notice that length stays away; both go on when the other is back."""
+    stage.muscle("/c", "realtime")
+    stage.plant("/c", "realtime", duration_s=0.5)
+    stage.until(lambda: stage.log("plant/c").count("episode of 500 ticks") >= 1)
+    stage.kill("muscle/c")
+    stage.until(lambda: "the body waits for it" in stage.log("plant/c") or "waiting:" in stage.log("plant/c"))
+    stage.muscle("/c", "realtime")
+    before = stage.log("plant/c").count("episode of 500 ticks")
+    stage.until(lambda: stage.log("plant/c").count("episode of 500 ticks") > before)
+    stage.kill("plant/c")
+    stage.until(lambda: "no length for 0.2" in stage.log("muscle/c"))
+    stage.plant("/c", "realtime", duration_s=0.5)
+    stage.until(lambda: stage.log("plant/c").count("episode of 500 ticks") >= 1)
+    assert "Traceback" not in "".join(stage.log(name) for name in stage.processes)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [({"scene": "elbow"}, "allowed is ankle or knee"), ({"duration": 1.0}, "did you mean 'duration_s'?")],
+)
+def test_bad_parameters_end_with_code_2_and_one_line(stage: Stage, given: dict[str, Any], words: str) -> None:
+    """As the muscle node does."""
+    stage._start("plant", "/d", given, PLANT)
+    assert stage.processes["plant"].wait() == 2
+    assert words in stage.log("plant")
+    assert stage.log("plant").count("\n") == 1

@@ -1,0 +1,131 @@
+"""The node one would write first: a fibre stepped in a timer of rclpy's default executor, to be measured against."""
+
+# mypy: allow-untyped-calls, allow-subclassing-any
+
+from __future__ import annotations
+
+import signal
+import time
+from types import FrameType
+from typing import Any
+
+import rclpy
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, QoSReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+
+from xb_muscle_ros.models.fibre_file import load_fibre
+from xb_muscle_ros.models.muscle import Array, Muscle
+from xb_muscle_ros.node.inlet import Inlet
+from xb_muscle_ros.node.inputs import Counts, Scale, length_change_l0
+from xb_muscle_ros.node.lateness import Lateness
+from xb_muscle_ros.node.outputs import OutputMessages
+from xb_muscle_ros.node.reporter import Reporter
+from xb_muscle_ros.node.status import Account, Status
+
+
+class PlainTimer(Node):
+    """Same fibre, same messages, same account of itself; subscriptions, timer and publishing in one executor."""
+
+    def __init__(self) -> None:
+        super().__init__("plain_timer", automatically_declare_parameters_from_overrides=True)
+        fibre = load_fibre(str(self.get_parameter("fiber_file").value))
+        self._muscle = Muscle(fibre)
+        self._scale = Scale(fibre.reference_length_m, fibre.f0_n)
+        self._period = round(1e9 / float(self.get_parameter("rate_hz").value))
+        newest = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
+        force, moments = (self.create_publisher(JointState, f"muscle/{topic}", 100) for topic in ("force", "moments"))
+        self._emit = OutputMessages(fibre.name, force, moments).publish
+        inlet = Inlet(fibre.name, self, self.get_logger())
+        inlet.open = True
+        self.create_subscription(JointState, "muscle/calcium", inlet.take_calcium, newest)
+        self.create_subscription(JointState, "muscle/length", inlet.take_length, newest)
+        self.counts = Counts()
+        self._change: float | None = None
+        self._calcium: float | None = None
+        self._state: Array | None = None
+        self._deadline: int | None = None
+        self._ticks = 0
+        self._forget()
+        self._reporter = Reporter(self, "plain timer")
+        self._reporter.watch([fibre], self, inlet)
+        self.create_service(Trigger, "~/reset", self._on_reset)
+        # Steady, so that it is not worse for another reason than the one in question.
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = self.create_timer(self._period * 1e-9, self._on_timer, clock=self._steady)
+        self.create_timer(1.0, lambda: self._reporter.report("active", time.monotonic(), 0.0), clock=self._steady)
+
+    def take_calcium(self, stamp: int, calcium_um: float) -> None:
+        """Free calcium, µM."""
+        del stamp
+        self._calcium = calcium_um
+
+    def take_length(self, stamp: int, position_m: float, velocity_m_per_s: float | None) -> None:
+        """Fibre length, m."""
+        del stamp, velocity_m_per_s
+        self._change = length_change_l0(position_m, self._scale)
+
+    def status(self) -> Status:
+        """How late timers were."""
+        return Status(self._ticks, 0, "", "", self._lateness.summary(), self._overruns, self._overruns)
+
+    def _forget(self) -> None:
+        self._lateness = Lateness()
+        self._overruns = 0
+
+    def _on_timer(self) -> None:
+        now = time.monotonic_ns()
+        if self._deadline is None:
+            self._deadline = now + int(self._timer.time_until_next_call()) - self._period
+        late = now - self._deadline
+        missed = max(late // self._period, 0)
+        self._overruns += missed
+        # As for the node's own ticks: every deadline counts, the skipped ones too.
+        for i in range(missed + 1):
+            self._lateness.note(max(late - i * self._period, 0))
+        self._deadline += (missed + 1) * self._period
+        if self._change is None or self._calcium is None:
+            return
+        if self._state is None:
+            self._state = self._muscle.settle(self._change, self._calcium)
+            self._deadline = None
+            return
+        self._state = self._muscle.step(self._state, self._change, self._calcium, self._period * 1e-9)
+        self._ticks += 1
+        stamp = int(self.get_clock().now().nanoseconds)
+        self._emit(stamp, self._muscle.outputs(self._state), self._scale)
+
+    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._forget()
+        response.success, response.message = True, f"forgotten after {Account()}"
+        return response
+
+
+def main() -> None:
+    """Run until told to stop."""
+    asked: list[int] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        asked.append(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    node = PlainTimer()
+    executor: Any = SingleThreadedExecutor()
+    executor.add_node(node)
+    while not asked:
+        executor.spin_once(timeout_sec=0.1)
+    executor.shutdown()
+    node.destroy_node()
+    try_shutdown()
+
+
+if __name__ == "__main__":
+    main()

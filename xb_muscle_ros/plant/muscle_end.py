@@ -1,0 +1,144 @@
+"""The plant's end of the wires to a muscle node: lengths and calcium out, forces in, all muscles in one message."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+
+import numpy as np
+from rclpy.qos import QoSProfile, QoSReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.node.inputs import stamp_ns
+from xb_muscle_ros.node.link import Link
+from xb_muscle_ros.plant.plant import Architecture, Array
+
+FIND_S = 10.0
+_HANDSHAKE_S = 1.0
+
+
+class MuscleEnd:
+    """One muscle node that has a fibre for each muscle of a plant, named after it.
+
+    Lengths and forces on the wires are those of the muscles, in m and N.
+
+    Attributes:
+        forces: F0, shape (muscle,), by stamp (ns), until taken.
+        newest: the newest of them and when it arrived (steady, s); None before the first.
+    """
+
+    def __init__(self, link: Link, muscles: tuple[Architecture, ...], fibre: Fibre, mode: str) -> None:
+        """Join the topics of the link's namespace.
+
+        Args:
+            link: to the node.
+            muscles: of the plant.
+            fibre: model and parameters that all its muscles shall have.
+            mode: ``lockstep`` or ``realtime``.
+        """
+        self.forces: dict[int, Array] = {}
+        self.newest: tuple[Array, float] | None = None
+        self._link = link
+        self._fibre = fibre
+        self._mode = mode
+        self._names = [m.name for m in muscles]
+        self._l0_m = np.array([m.l0_m for m in muscles])
+        self._f0_n = np.array([m.f0_n for m in muscles])
+        qos = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
+        self._length = link.node.create_publisher(JointState, "muscle/length", qos)
+        self._calcium = link.node.create_publisher(JointState, "muscle/calcium", qos)
+        self._inlet = link.node.create_subscription(JointState, "muscle/force", self._on_force, qos)
+
+    @property
+    def command(self) -> str:
+        """How to start such a node."""
+        space = self._link.node.get_namespace()
+        where = "" if space == "/" else f" -r __ns:={space}"
+        return (
+            f"muscle_node --ros-args{where} -p fiber_file:={self._fibre.path or self._fibre.name} "
+            f'-p model:={self._fibre.model} -p mode:={self._mode} -p "fibers:=[{", ".join(self._names)}]"'
+        )
+
+    def find(self, timeout_s: float = FIND_S) -> bool:
+        """Find the node, and give it the muscles' parameters; whether it had others.
+
+        Raises:
+            UserError: there is none, or it has another model, method or mode, or other fibres.
+        """
+        link, fibre = self._link, self._fibre
+        link.find(timeout_s, self.command)
+        wanted: dict[str, object] = {"mode": self._mode, "model": fibre.model, "method": fibre.method}
+        found = link.parameters([*wanted, *(f"{name}.constants.f0_n" for name in self._names)])
+        for name, value in wanted.items():
+            if found.get(name) != value:
+                raise UserError(
+                    f"node {link.peer} has {name} = {found.get(name, 'none')}, needed is {value}; end the node and "
+                    f"start another: {self.command}"
+                )
+        missing = [name for name in self._names if f"{name}.constants.f0_n" not in found]
+        if missing:
+            raise UserError(
+                f"node {link.peer} has no fibre '{missing[0]}'; end the node and start another: {self.command}"
+            )
+        known = [found[f"{name}.constants.f0_n"] for name in self._names] == self._f0_n.tolist()
+        link.set_parameters(self._parameters())
+        return not known
+
+    def settle(self, length_l0: Array, calcium_um: Mapping[str, float], timeout_s: float = FIND_S) -> Array:
+        """Forces (F0) of fibres that settled at lengths (L0) with calcium, after a reset, both stamped 0.
+
+        Again from a reset while the node's answers may not find their way yet.
+
+        Raises:
+            UserError: no answer.
+        """
+        end = time.monotonic() + timeout_s
+        while time.monotonic() < end:
+            self._link.reset()
+            self.forces.clear()
+            self.send_calcium(0, calcium_um)
+            self.send_length(0, length_l0)
+            if self._link.wait_for(lambda: 0 in self.forces, _HANDSHAKE_S):
+                return self.forces.pop(0)
+        raise UserError(f"node {self._link.peer} did not answer within {timeout_s:g} s; see its log")
+
+    def force(self, stamp: int, timeout_s: float) -> Array | None:
+        """Forces of a stamp (ns) in F0, waited for; None where they do not come."""
+        self._link.wait_for(lambda: stamp in self.forces, timeout_s)
+        return self.forces.pop(stamp, None)
+
+    def send_length(self, stamp: int, length_l0: Array, velocity_l0_per_s: Array | None = None) -> None:
+        """Publish length changes (L0) as lengths in m, with velocities where given; stamp in ns."""
+        message = self._message(stamp, (1.0 + length_l0) * self._l0_m)
+        if velocity_l0_per_s is not None:
+            message.velocity = (velocity_l0_per_s * self._l0_m).tolist()
+        self._length.publish(message)
+
+    def send_calcium(self, stamp: int, calcium_um: Mapping[str, float]) -> None:
+        """Publish calcium (µM) by muscle; stamp in ns."""
+        self._calcium.publish(self._message(stamp, np.array([calcium_um[name] for name in self._names])))
+
+    def _parameters(self) -> dict[str, object]:
+        fibre = self._fibre
+        made: dict[str, object] = {}
+        for i, name in enumerate(self._names):
+            made[f"{name}.constants.reference_length_m"] = float(self._l0_m[i])
+            made[f"{name}.constants.f0_n"] = float(self._f0_n[i])
+            made.update({f"{name}.models.{fibre.model}.{key}": value for key, value in fibre.values.items()})
+        return made
+
+    def _message(self, stamp: int, values: Array) -> JointState:
+        message = JointState(name=self._names, position=values.tolist())
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+        return message
+
+    def _on_force(self, message: JointState) -> None:
+        if list(message.name) == self._names:
+            force: Array = np.array(message.effort) / self._f0_n
+            if self._mode == "lockstep":
+                self.forces[stamp_ns(message.header.stamp)] = force
+            self.newest = force, time.monotonic()

@@ -1,0 +1,294 @@
+"""``plant_node``: a body in MuJoCo as a ROS node, beside a muscle node that moves it, in lockstep or in real time."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Callable, Mapping
+from types import FrameType, MappingProxyType
+from typing import Any
+
+from xb_muscle_ros.errors import UserError, suggest
+
+USAGE = """\
+usage: plant_node --ros-args [-p NAME:=VALUE]... [-r __ns:=/NAMESPACE]
+
+A body in MuJoCo as a ROS 2 node: publishes muscle/length (with velocity), muscle/calcium and plant/joint, subscribes
+muscle/force. It needs a muscle_node with a fibre for each of its muscles, and says how to start one.
+  plant_node --ros-args -p scene:=ankle -p mode:=realtime
+docs/loop.md lists parameters."""
+
+_SETTLE_S = 0.3
+_FIND_S = 2.0
+_CALCIUM_EVERY = 50
+
+
+def parameters() -> Mapping[str, Any]:
+    """Rows of the node's parameters, all of which are read at the start only."""
+    from xb_muscle_ros.node.parameters import START, Row
+
+    return MappingProxyType(
+        {
+            "scene": Row("ankle", "", "what to move", START, choices=("ankle", "knee")),
+            "mode": Row(
+                "lockstep", "", "of the muscle node and so of this one", START, choices=("lockstep", "realtime")
+            ),
+            "fiber_file": Row("18Dec2017a", "", "fibre file, path or packaged fibre name", START),
+            "model": Row("3state_coop", "", "parameter set of the fibre file", START),
+            "elastic_tendon": Row(False, "", "tendons stretch", START),
+            "duration_s": Row(1.0, "s", "length of an episode; then all starts anew", START, 0.01, 3600.0),
+            "episodes": Row(0, "", "how many; 0: until stopped", START, 0, 10**9),
+            "displacement_m": Row(-0.075, "m", "of the platform in the scene ankle", START, -1.0, 1.0),
+            "speed_m_per_s": Row(0.2, "m/s", "of the platform", START, 1e-3, 5.0),
+            "acceleration_m_per_s2": Row(2.0, "m/s²", "of the platform", START, 1e-2, 50.0),
+            "timeout_s": Row(0.5, "s", "age of the force beyond which the body waits for it", START, 0.01, 3600.0),
+        }
+    )
+
+
+class PlantNode:
+    """Plays episodes until it is told to stop, whatever becomes of the muscle node meanwhile."""
+
+    def __init__(self, node: Any, stop: Callable[[], bool]) -> None:
+        """Read parameters, build the body and join the topics.
+
+        Args:
+            node: of rclpy, which declared its parameters as they came.
+            stop: whether to end.
+
+        Raises:
+            UserError: a parameter, or what it names, is wrong.
+        """
+        from sensor_msgs.msg import JointState
+
+        from xb_muscle_ros.models.fibre_file import load_fibre
+        from xb_muscle_ros.node.link import Link
+        from xb_muscle_ros.plant.body import Body
+        from xb_muscle_ros.plant.muscle_end import MuscleEnd
+        from xb_muscle_ros.plant.translation import RampAndHold
+
+        given = _read(node)
+        self._mode: str = given["mode"]
+        self._episodes: int = given["episodes"]
+        self._timeout_s: float = given["timeout_s"]
+        self._stop = stop
+        self._log = node.get_logger()
+        self._clock = node.get_clock()
+        platform = RampAndHold(given["displacement_m"], given["speed_m_per_s"], given["acceleration_m_per_s2"])
+        fibre = load_fibre(given["fiber_file"], given["model"])
+        self._body = Body(given["scene"], fibre, platform, given["elastic_tendon"])
+        self._ticks = round(given["duration_s"] / self._body.plant.tick_s)
+        self._link = Link.around(node)
+        self._link.stop = stop
+        self._end = MuscleEnd(self._link, self._body.plant.muscles, self._body.fibre, self._mode)
+        self._to_joint = node.create_publisher(JointState, "plant/joint", 100)
+        self._joint = JointState(name=[given["scene"]])
+        self._said = ""
+        # Of the realtime thread: ticks until the muscles have settled, and whether the body waits for force.
+        self._settling = 0
+        self._waiting_since: float | None = None
+
+    def run(self) -> None:
+        """Play."""
+        played = 0
+        while not self._stop() and (self._episodes == 0 or played < self._episodes):
+            self._body.restart()
+            self._play_lockstep() if self._mode == "lockstep" else self._play_realtime()
+            played += 1
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._link.close()
+
+    def _insist(self, act: Callable[[], Any]) -> Any:
+        """Result of something that a muscle node must be there for, tried until it is; None where told to stop."""
+        while not self._stop():
+            try:
+                result = act()
+            except UserError as error:
+                if str(error) != self._said:
+                    self._said = str(error)
+                    self._log.warning(f"waiting: {error}")
+                continue
+            if self._said:
+                self._said = ""
+                self._log.info(f"going on with node {self._link.peer}")
+            return result
+        return None
+
+    def _play_lockstep(self) -> None:
+        body, end = self._body, self._end
+
+        def settled() -> Any:
+            end.find(_FIND_S)
+            return end.settle(body.length_l0, body.calcium_um, _FIND_S)
+
+        force = self._insist(settled)
+        while force is not None and not self._stop():
+            self._show(round(body.tick * body.plant.tick_s * 1e9))
+            body.advance(force)
+            if body.tick >= self._ticks:
+                return
+            force = self._answer(round(body.tick * body.plant.tick_s * 1e9))
+
+    def _answer(self, stamp: int) -> Any:
+        """Forces of a stamp, asked for until they come; None where told to stop."""
+        end, body = self._end, self._body
+        end.send_length(stamp, body.length_l0, body.velocity_l0_per_s)
+        force = end.force(stamp, self._timeout_s)
+        if force is not None or self._stop():
+            return force
+        self._log.warning(f"no force within {self._timeout_s:g} s of the length at {stamp * 1e-9:g} s: asking again")
+
+        def again() -> Any:
+            # Another node may have taken its place: it knows neither parameters nor calcium.
+            if end.find(_FIND_S):
+                self._link.reset()
+            end.send_calcium(stamp, body.calcium_um)
+            end.send_length(stamp, body.length_l0, body.velocity_l0_per_s)
+            found = end.force(stamp, 1.0)
+            if found is None:
+                raise UserError(f"node {self._link.peer} does not answer")
+            return found
+
+        force = self._insist(again)
+        if force is not None:
+            self._log.info(f"force is back at {stamp * 1e-9:g} s; the fibres have settled anew if their node has")
+        return force
+
+    def _play_realtime(self) -> None:
+        from xb_muscle_ros.node.ticker import Ticker
+
+        def met() -> bool:
+            self._end.find(_FIND_S)
+            self._link.reset()
+            self._end.newest = None
+            return True
+
+        if self._insist(met) is None:
+            return
+        self._settling = round(_SETTLE_S / self._body.plant.tick_s)
+        self._waiting_since = None
+        ticker = Ticker(lambda: True, self._tick, self._publish)
+        period = round(self._body.plant.tick_s * 1e9)
+        ticker.start(period, lambda: 10, 0, self._log, lambda: None)
+        try:
+            while not self._stop() and self._body.tick < self._ticks:
+                self._link.wait_for(lambda: self._body.tick >= self._ticks, 0.1)
+                since = self._waiting_since
+                if since is not None and time.monotonic() - since > _FIND_S:
+                    self._insist(self._look_again)
+                    self._waiting_since = None if self._waiting_since is None else time.monotonic()
+        finally:
+            ticker.stop()
+        late = ticker.lateness.summary()
+        self._log.info(
+            f"episode of {self._body.tick} ticks: lateness p50 {late.p50_us:.0f}, p99 {late.p99_us:.0f} µs, "
+            f"{ticker.overruns} overruns"
+        )
+
+    def _look_again(self) -> bool:
+        if self._end.find(_FIND_S):
+            self._link.reset()
+        return True
+
+    def _tick(self, deadline_ns: int) -> None:
+        del deadline_ns
+        newest, now = self._end.newest, time.monotonic()
+        if newest is None or now - newest[1] > self._timeout_s:
+            if self._waiting_since is None:
+                self._waiting_since = now
+                if newest is not None:
+                    self._log.warning(f"no force for {now - newest[1]:.3f} s: the body waits for it")
+            return
+        if self._waiting_since is not None:
+            self._waiting_since = None
+            self._log.info("force is there: the body moves on")
+        if self._settling:
+            self._settling -= 1
+        elif self._body.tick < self._ticks:
+            self._body.advance(newest[0])
+
+    def _publish(self) -> None:
+        body, stamp = self._body, int(self._clock.now().nanoseconds)
+        if stamp // 1_000_000 % _CALCIUM_EVERY == 0 or self._settling or self._waiting_since is not None:
+            # Best effort on the other side: what is sent once may be lost, or come before a node that starts later.
+            self._end.send_calcium(stamp, body.calcium_um)
+        self._end.send_length(stamp, body.length_l0, body.velocity_l0_per_s)
+        self._show(stamp)
+
+    def _show(self, stamp: int) -> None:
+        joint, plant = self._joint, self._body.plant
+        joint.header.stamp.sec, joint.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+        joint.position, joint.velocity = [plant.angle_rad], [plant.velocity_rad_per_s]
+        joint.effort = [self._body.torque_nm]
+        self._to_joint.publish(joint)
+
+
+def _read(node: Any) -> dict[str, Any]:
+    """Values of the parameters, checked and declared with their descriptors."""
+    from xb_muscle_ros.node.parameters import check_value, is_foreign, row_descriptor
+
+    rows = parameters()
+    given = {name: p.value for name, p in node.get_parameters_by_prefix("").items() if not is_foreign(name)}
+    values: dict[str, Any] = {}
+    for name in given:
+        if name not in rows:
+            raise UserError(f"parameter '{name}' is not known{suggest(name, rows)}")
+        node.undeclare_parameter(name)
+    for name, row in rows.items():
+        values[name] = check_value(name, row, given.get(name, row.default))
+        node.declare_parameter(name, values[name], row_descriptor(row), ignore_override=True)
+    return values
+
+
+def main() -> None:
+    """Run the node until it is told to stop.
+
+    Raises:
+        SystemExit: code 2 after one line on stderr, where the user can mend something.
+    """
+    asked: list[int] = []
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        asked.append(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
+    try:
+        if "-h" in sys.argv or "--help" in sys.argv:
+            print(USAGE)
+            return
+        _run(lambda: bool(asked))
+    except UserError as error:
+        print(f"plant_node: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+
+
+def _run(stop: Callable[[], bool]) -> None:
+    try:
+        import rclpy
+        from rclpy.signals import SignalHandlerOptions
+        from rclpy.utilities import try_shutdown
+    except ImportError as error:
+        raise UserError(f"ROS 2 cannot be imported ({error}); source a ROS 2 Jazzy, or run scripts/setup") from error
+    try:
+        rclpy.init(args=["plant_node", *sys.argv[1:]], signal_handler_options=SignalHandlerOptions.NO)
+        node = rclpy.create_node("plant_node", automatically_declare_parameters_from_overrides=True)
+    except Exception as error:
+        raise UserError(f"the node cannot be created: {' '.join(str(error).split())}; see --help") from error
+    try:
+        plant = PlantNode(node, stop)
+        try:
+            plant.run()
+        finally:
+            plant.close()
+    finally:
+        try_shutdown()
+
+
+if __name__ == "__main__":
+    main()
