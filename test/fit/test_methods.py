@@ -180,7 +180,7 @@ def test_bins_wider_than_attachment_are_told(grid_problem: Problem, grid_fitted:
 
 
 def test_a_fit_that_did_not_settle_is_told(grid_fitted: Fitted) -> None:
-    assert any("did not settle" in line for line in warnings(replace(grid_fitted, mismatch_f0=3e-4)))
+    assert any("did not settle" in line for line in warnings(replace(grid_fitted, method_settled=False)))
 
 
 def test_where_the_grid_has_no_solution_a_fit_says_so(grid_problem: Problem) -> None:
@@ -189,7 +189,18 @@ def test_where_the_grid_has_no_solution_a_fit_says_so(grid_problem: Problem) -> 
     start = descend(Objective(Training(fast_form(grid_problem)), FIRST), grid_problem.start)
     narrow = changed(grid_problem.fibre, {"strain_range": 1.5, "regrid": 0.0}, "test")
     with pytest.raises(UserError, match="method characteristics has no solution where the Gaussian form fits best"):
-        refined(replace(grid_problem, fibre=narrow), start, HERE)
+        refined(replace(grid_problem, fibre=narrow), start, None, HERE)
+
+
+def test_isometric_force_alone_can_be_met(grid_problem: Problem) -> None:
+    """Features have no samples that would tell when the correction holds."""
+    coordinates = parameter_coordinates(grid_problem.fibre, ["f"], (), {}, {})
+    wanted = tuple(replace(F0_ANCHOR, pca=pca, value=value) for pca, value in ((4.5, 1.05), (6.1, 0.55)))
+    found = fit(Problem(grid_problem.fibre, (), coordinates, {}, wanted), Settings(1, level=None), HERE)
+    assert found.method_settled
+    objective = Objective(Training(found.problem), Scale(*found.scale))
+    plain = descend(objective, found.problem.start)
+    np.testing.assert_allclose(found.best.z, plain.z, atol=1e-3)
 
 
 def test_models_with_one_method_need_no_correction(problem: Problem) -> None:
