@@ -12,6 +12,7 @@ import pytest
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit import descents
 from xb_muscle_ros.fit.coordinates import fault_coordinates, parameter_coordinates
+from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.features import F0_ANCHOR
 from xb_muscle_ros.fit.methods import corrected, difference, fast_form
@@ -101,13 +102,13 @@ def test_correction_survives_the_way_to_a_worker(grid_problem: Problem) -> None:
     assert not np.array_equal(Training(sent).force(there), Training(fast_form(problem)).force(there))
 
 
-def test_correction_without_slopes_moves_nothing(grid_problem: Problem) -> None:
+def test_level_correction_is_right_at_its_point_alone(grid_problem: Problem) -> None:
     z = grid_problem.start
-    correction = corrected(grid_problem, z, difference(grid_problem, z), HERE).correction
-    assert correction is not None
-    name = grid_problem.trials[0].name
-    np.testing.assert_array_equal(correction.level().of_trial(name, z + 0.3), correction.of_trial(name, z))
-    assert np.abs(correction.of_trial(name, z + 0.3) - correction.of_trial(name, z)).max() > 1e-4
+    here = difference(grid_problem, z)
+    level = Correction.level(z, here.force, here.features)
+    training, exact = Training(replace(fast_form(grid_problem), correction=level)), Training(grid_problem)
+    np.testing.assert_allclose(training.force(z), exact.force(z), atol=1e-12)
+    assert np.abs(training.force(z + 0.3) - exact.force(z + 0.3)).max() > 1e-4
 
 
 def test_only_training_trials_have_a_correction(grid_problem: Problem) -> None:

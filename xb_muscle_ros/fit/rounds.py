@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 # Rounds and halvings of one round's step at most.
 _ROUNDS, _HALVINGS = 8, 6
 # The correction holds where it meets the method itself to this, root mean square over the samples: a hundredth of the
-# noise of a good recording, and what steps of 1 ms on a grid err by. Features are met to a hundredth of their sd.
+# noise of a good recording. Features are met to a hundredth of their sd.
 _CLOSE_F0, _CLOSE_SD = 1e-5, 0.01
 # A gain in cost that is none: a hundredth of what one standard deviation of a coordinate is worth.
 _NO_GAIN = 0.005
@@ -86,7 +86,8 @@ def refined(asked: Problem, best: Solution, scale: Scale | None, options: Option
             # The slopes of the correction are no use: the method errs by more than it should.
             break
         mismatch, off = _mismatch(problem, best.z, here)
-        settled = mismatch <= _CLOSE_F0 and off <= _CLOSE_SD and scale is not None
+        whole = np.array_equal(best.z, found.z)
+        settled = whole and mismatch <= _CLOSE_F0 and off <= _CLOSE_SD and scale is not None
         if settled:
             break
     return Refined(problem, best, scale or scale_at(problem, best.z), mismatch, settled)
@@ -117,8 +118,7 @@ def _stepped(
 
 def _exactly(asked: Problem, here: Difference, point: Solution, scale: Scale) -> Solution:
     """A point with cost and RMSD by the method itself, from its difference there."""
-    none = {name: np.zeros((force.size, point.z.size)) for name, force in here.force.items()}
-    exact = Correction(point.z, here.force, none, here.features, np.zeros((here.features.size, point.z.size)))
+    exact = Correction.level(point.z, here.force, here.features)
     training = Training(replace(fast_form(asked), correction=exact))
     cost = float(0.5 * np.sum(Objective(training, scale).residuals(point.z) ** 2))
     return point._replace(cost=cost, rmsd_f0=_root_mean_square([training.force(point.z) - training.measured]))
