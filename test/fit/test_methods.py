@@ -12,6 +12,7 @@ import pytest
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit import descents
 from xb_muscle_ros.fit.coordinates import fault_coordinates, parameter_coordinates
+from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.features import F0_ANCHOR
 from xb_muscle_ros.fit.methods import corrected, difference, fast_form
@@ -101,13 +102,13 @@ def test_correction_survives_the_way_to_a_worker(grid_problem: Problem) -> None:
     assert not np.array_equal(Training(sent).force(there), Training(fast_form(problem)).force(there))
 
 
-def test_correction_without_slopes_moves_nothing(grid_problem: Problem) -> None:
+def test_level_correction_is_right_at_its_point_alone(grid_problem: Problem) -> None:
     z = grid_problem.start
-    correction = corrected(grid_problem, z, difference(grid_problem, z), HERE).correction
-    assert correction is not None
-    name = grid_problem.trials[0].name
-    np.testing.assert_array_equal(correction.level().of_trial(name, z + 0.3), correction.of_trial(name, z))
-    assert np.abs(correction.of_trial(name, z + 0.3) - correction.of_trial(name, z)).max() > 1e-4
+    here = difference(grid_problem, z)
+    level = Correction.level(z, here.force, here.features)
+    training, exact = Training(replace(fast_form(grid_problem), correction=level)), Training(grid_problem)
+    np.testing.assert_allclose(training.force(z), exact.force(z), atol=1e-12)
+    assert np.abs(training.force(z + 0.3) - exact.force(z + 0.3)).max() > 1e-4
 
 
 def test_only_training_trials_have_a_correction(grid_problem: Problem) -> None:
@@ -180,7 +181,7 @@ def test_bins_wider_than_attachment_are_told(grid_problem: Problem, grid_fitted:
 
 
 def test_a_fit_that_did_not_settle_is_told(grid_fitted: Fitted) -> None:
-    assert any("did not settle" in line for line in warnings(replace(grid_fitted, mismatch_f0=3e-4)))
+    assert any("did not settle" in line for line in warnings(replace(grid_fitted, method_settled=False)))
 
 
 def test_where_the_grid_has_no_solution_a_fit_says_so(grid_problem: Problem) -> None:
@@ -189,7 +190,18 @@ def test_where_the_grid_has_no_solution_a_fit_says_so(grid_problem: Problem) -> 
     start = descend(Objective(Training(fast_form(grid_problem)), FIRST), grid_problem.start)
     narrow = changed(grid_problem.fibre, {"strain_range": 1.5, "regrid": 0.0}, "test")
     with pytest.raises(UserError, match="method characteristics has no solution where the Gaussian form fits best"):
-        refined(replace(grid_problem, fibre=narrow), start, HERE)
+        refined(replace(grid_problem, fibre=narrow), start, None, HERE)
+
+
+def test_isometric_force_alone_can_be_met(grid_problem: Problem) -> None:
+    """Features have no samples that would tell when the correction holds."""
+    coordinates = parameter_coordinates(grid_problem.fibre, ["f"], (), {}, {})
+    wanted = tuple(replace(F0_ANCHOR, pca=pca, value=value) for pca, value in ((4.5, 1.05), (6.1, 0.55)))
+    found = fit(Problem(grid_problem.fibre, (), coordinates, {}, wanted), Settings(1, level=None), HERE)
+    assert found.method_settled
+    objective = Objective(Training(found.problem), Scale(*found.scale))
+    plain = descend(objective, found.problem.start)
+    np.testing.assert_allclose(found.best.z, plain.z, atol=1e-3)
 
 
 def test_models_with_one_method_need_no_correction(problem: Problem) -> None:

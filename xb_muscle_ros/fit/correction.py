@@ -9,7 +9,7 @@ Alexandrov and Lewis, Optimization and Engineering 2 (2001) 413-430).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -37,6 +37,12 @@ class Correction:
     features: Array
     feature_slopes: Array
 
+    @staticmethod
+    def level(at: Array, force: Mapping[str, Array], features: Array) -> Correction:
+        """A correction that is the same everywhere: right at the point alone, and computed without slopes."""
+        none = {name: np.zeros((values.size, at.size)) for name, values in force.items()}
+        return Correction(at, force, none, features, np.zeros((features.size, at.size)))
+
     def of_trial(self, name: str, z: Array) -> Array:
         """What to add to the fibre's force in a trial at a point, F0, before the recording's faults.
 
@@ -51,14 +57,6 @@ class Correction:
         """What to add to the distances of the training features at a point, in standard deviations."""
         added: Array = self.features + self.feature_slopes @ (z - self.at)
         return added
-
-    def level(self) -> Correction:
-        """The same without slopes."""
-        return replace(
-            self,
-            force_slopes={name: np.zeros_like(slopes) for name, slopes in self.force_slopes.items()},
-            feature_slopes=np.zeros_like(self.feature_slopes),
-        )
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.noise import Scale, scale_of
@@ -14,6 +15,8 @@ from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.solve import Objective, Solution, descend
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.work import Options, run
+
+Array = npt.NDArray[np.float64]
 
 
 def start_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -28,15 +31,23 @@ def start_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
     return solution_to_json(descend(objective, z))
 
 
-def polished(problem: Problem, best: Solution, options: Options) -> tuple[Solution, Scale]:
-    """The best point under the scale that the residuals turn out to have."""
+def scale_at(problem: Problem, z: Array) -> Scale:
+    """Scale that the residuals at a point turn out to have."""
     training = Training(problem)
-    residual = training.force(best.z) - training.measured
-    scale = scale_of([residual[s] for s in training.slices()], best.z.size)
+    residual = training.force(z) - training.measured
+    return scale_of([residual[s] for s in training.slices()], z.size)
+
+
+def descended(problem: Problem, best: Solution, scale: Scale, options: Options) -> Solution:
+    """Where one descent from a point ends; the point itself where the model has no solution there."""
     task = {"problem": problem.to_json(), "z": best.z.tolist(), "scale": list(scale)}
-    here = replace(options, label="polish", processes=0 if options.scheduler is None else None)
-    row = run(start_task, [task], here)[0]
-    return (best if row is None else solution_from_json(row)), scale
+    row = run(start_task, [task], nearby(options, "polish"))[0]
+    return best if row is None else solution_from_json(row)
+
+
+def nearby(options: Options, label: str) -> Options:
+    """Options for a second's work: in this process, since others take as long to start, unless there is a cluster."""
+    return replace(options, label=label, processes=0 if options.scheduler is None else None)
 
 
 def solution_to_json(s: Solution) -> dict[str, Any]:

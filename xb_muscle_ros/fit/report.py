@@ -180,7 +180,7 @@ def _of_grid(fitted: Fitted) -> list[str]:
             f"strain bins of {width:.2g} power strokes are too wide for heads that attach with an sd of "
             f"{attaching:.2g}: forces err in jumps of up to some 0.1 % F0; use --set bins={enough} or more"
         )
-    if not fitted.correction_settled:
+    if not fitted.method_settled:
         found.append(
             f"the fit by {fibre.method} did not settle: the corrected Gaussian form is {fitted.mismatch_f0:.1g} F0 off;"
             " start again from the file it wrote"
@@ -205,6 +205,7 @@ def as_json(fitted: Fitted, provenance: Mapping[str, Any]) -> dict[str, Any]:
         "converged": fitted.best.converged,
         "settled": fitted.settled,
         "mismatch_f0": fitted.mismatch_f0,
+        "method_settled": fitted.method_settled,
         "scale": fitted.scale._asdict(),
         "train_rmsd_f0": mean_rmsd(rows, False, "rmsd_f0"),
         "heldout_rmsd_f0": mean_rmsd(rows, True, "rmsd_f0"),

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.correction import Correction
-from xb_muscle_ros.fit.descents import polished
+from xb_muscle_ros.fit.descents import descended, nearby, scale_at
 from xb_muscle_ros.fit.methods import Difference, corrected, difference, fast_form
-from xb_muscle_ros.fit.noise import Scale
+from xb_muscle_ros.fit.noise import FIRST, Scale
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.solve import Objective, Solution
 from xb_muscle_ros.fit.training import Training
@@ -23,10 +23,12 @@ Array = npt.NDArray[np.float64]
 # Rounds and halvings of one round's step at most.
 _ROUNDS, _HALVINGS = 8, 6
 # The correction holds where it meets the method itself to this, root mean square over the samples: a hundredth of the
-# noise of a good recording, and what steps of 1 ms on a grid err by.
-CLOSE_F0 = 1e-5
+# noise of a good recording. Features are met to a hundredth of their sd.
+_CLOSE_F0, _CLOSE_SD = 1e-5, 0.01
 # A gain in cost that is none: a hundredth of what one standard deviation of a coordinate is worth.
 _NO_GAIN = 0.005
+# The scale of the differences is found where what the correction misses is such a share of them.
+_LITTLE = 0.2
 
 
 class Refined(NamedTuple):
@@ -37,15 +39,17 @@ class Refined(NamedTuple):
         best: the best point.
         scale: of the differences left there.
         mismatch_f0: root-mean-square error of the corrected force at the best point against the method itself, F0.
+        settled: whether the best point is one of the method's own.
     """
 
     problem: Problem
     best: Solution
     scale: Scale
     mismatch_f0: float
+    settled: bool
 
 
-def refined(asked: Problem, best: Solution, options: Options) -> Refined:
+def refined(asked: Problem, best: Solution, scale: Scale | None, options: Options) -> Refined:
     """Go from the Gaussian form's best point to that of the problem's own method.
 
     Each round corrects the Gaussian form at the point reached and descends anew. A step that makes the method's own
@@ -54,13 +58,16 @@ def refined(asked: Problem, best: Solution, options: Options) -> Refined:
     Args:
         asked: the problem, by any method.
         best: best point by the Gaussian form, or one close to the best.
+        scale: of the differences where it is known; None: what they turn out to have as soon as what the correction
+            misses matters little beside them. By the Gaussian form always what they have at the point.
         options: where the work is done.
 
     Raises:
         UserError: the method has no solution at the point.
     """
     if fast_form(asked) is asked:
-        return Refined(asked, *polished(asked, best, options), 0.0)
+        scale = scale_at(asked, best.z)
+        return Refined(asked, descended(asked, best, scale, options), scale, 0.0, True)
     try:
         here = difference(asked, best.z)
     except UserError as error:
@@ -68,18 +75,22 @@ def refined(asked: Problem, best: Solution, options: Options) -> Refined:
             f"method {asked.fibre.method} has no solution where the Gaussian form fits best: {error}; start from "
             "another fibre file"
         ) from error
-    mismatch = _root_mean_square(list(here.force.values()))
+    mismatch, settled = _root_mean_square(list(here.force.values())), False
     for _ in range(_ROUNDS):
-        problem = corrected(asked, best.z, here, replace(options, label="correction"))
-        found, scale = polished(problem, best, options)
-        here, best, moved = _stepped(asked, here, best, found, scale)
+        problem = corrected(asked, best.z, here, nearby(options, "correction"))
+        if scale is None and mismatch <= _LITTLE * best.rmsd_f0:
+            scale = scale_at(problem, best.z)
+        found = descended(problem, best, scale or FIRST, options)
+        here, best, moved = _stepped(asked, here, best, found, scale or FIRST)
         if not moved:
             # The slopes of the correction are no use: the method errs by more than it should.
             break
-        mismatch = _mismatch(problem, best.z, here)
-        if mismatch <= CLOSE_F0:
+        mismatch, off = _mismatch(problem, best.z, here)
+        whole = np.array_equal(best.z, found.z)
+        settled = whole and mismatch <= _CLOSE_F0 and off <= _CLOSE_SD and scale is not None
+        if settled:
             break
-    return Refined(problem, best, scale, mismatch)
+    return Refined(problem, best, scale or scale_at(problem, best.z), mismatch, settled)
 
 
 def _stepped(
@@ -107,19 +118,19 @@ def _stepped(
 
 def _exactly(asked: Problem, here: Difference, point: Solution, scale: Scale) -> Solution:
     """A point with cost and RMSD by the method itself, from its difference there."""
-    none = {name: np.zeros((force.size, point.z.size)) for name, force in here.force.items()}
-    exact = Correction(point.z, here.force, none, here.features, np.zeros((here.features.size, point.z.size)))
+    exact = Correction.level(point.z, here.force, here.features)
     training = Training(replace(fast_form(asked), correction=exact))
     cost = float(0.5 * np.sum(Objective(training, scale).residuals(point.z) ** 2))
     return point._replace(cost=cost, rmsd_f0=_root_mean_square([training.force(point.z) - training.measured]))
 
 
-def _mismatch(problem: Problem, z: Array, here: Difference) -> float:
-    """Root-mean-square difference between the correction of a problem at a point and the right one, F0."""
+def _mismatch(problem: Problem, z: Array, here: Difference) -> tuple[float, float]:
+    """What the correction is off by at a point: root mean square of force (F0), most of a feature (SD)."""
     correction = problem.correction
     if correction is None:
-        return 0.0
-    return _root_mean_square([force - correction.of_trial(name, z) for name, force in here.force.items()])
+        return 0.0, 0.0
+    force = _root_mean_square([force - correction.of_trial(name, z) for name, force in here.force.items()])
+    return force, float(np.max(np.abs(here.features - correction.of_features(z)), initial=0.0))
 
 
 def _root_mean_square(parts: list[Array]) -> float:

@@ -16,7 +16,7 @@ from xb_muscle_ros.fit.features import F0_ANCHOR
 from xb_muscle_ros.fit.methods import fast_form
 from xb_muscle_ros.fit.noise import FIRST, Scale
 from xb_muscle_ros.fit.problem import Problem
-from xb_muscle_ros.fit.rounds import CLOSE_F0, refined
+from xb_muscle_ros.fit.rounds import refined
 from xb_muscle_ros.fit.solve import Objective, Solution
 from xb_muscle_ros.fit.training import Training, finite_start
 from xb_muscle_ros.fit.uncertainty import Curvature, Side, curvature, profile_side
@@ -61,6 +61,7 @@ class Fitted:
         settled: False where profiles went on finding better points.
         mismatch_f0: of a method other than the Gaussian form, how far the corrected Gaussian form is from it at the
             best point (root mean square, F0); see `rounds`.
+        method_settled: False where the best point is not the method's own: rounds went on, or led nowhere.
     """
 
     problem: Problem
@@ -72,11 +73,7 @@ class Fitted:
     sides: Mapping[int, tuple[Side, Side]]
     settled: bool
     mismatch_f0: float = 0.0
-
-    @property
-    def correction_settled(self) -> bool:
-        """Whether the best point is one of the method's own."""
-        return self.mismatch_f0 <= CLOSE_F0
+    method_settled: bool = True
 
 
 def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
@@ -106,10 +103,11 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
     starts = _descended(tasks, options)
     best = min((s for s in starts if s is not None), key=lambda s: s.cost)
     sides: dict[int, tuple[Side, Side]] = {}
-    settled = False
+    settled, known = False, None
     for _ in range(_RESTARTS):
-        found = refined(problem, best, options)
+        found = refined(problem, best, known, options)
         best, scale = found.best, found.scale
+        known = scale
         shape = curvature(Objective(Training(found.problem), scale), best.z)
         if settings.level is None:
             settled = True
@@ -119,7 +117,9 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
         if better is None:
             break
         best = best._replace(z=better)
-    return Fitted(problem, settings, best, scale, tuple(starts), shape, sides, settled, found.mismatch_f0)
+    return Fitted(
+        problem, settings, best, scale, tuple(starts), shape, sides, settled, found.mismatch_f0, found.settled
+    )
 
 
 def profile_task(task: Mapping[str, Any]) -> dict[str, Any]:
