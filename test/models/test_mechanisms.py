@@ -234,6 +234,19 @@ def test_a_swap_makes_the_model_that_has_the_block() -> None:
     assert set(SWAPS).isdisjoint(EXTRAS)
 
 
+def test_models_share_code_only_with_models_of_the_same_blocks() -> None:
+    names = ("2state", "2state+thick_filament_cooperativity", "2state+thin_filament_cooperativity", "2state_coop",
+             "2state_coop+viscous_drag", "2state_coop+viscous_drag+thick_filament_cooperativity",
+             "2state_coop+thick_filament_cooperativity+viscous_drag", "3state_coop+viscous_drag")  # fmt: skip
+    composed = {name: compose(name) for name in names}
+    for a, one in composed.items():
+        for b, other in composed.items():
+            assert isinstance(one, Composition)
+            assert isinstance(other, Composition)
+            same = [type(x) for x in one.blocks] == [type(x) for x in other.blocks]
+            assert (one.name == other.name) is same, (a, b)
+
+
 def test_a_set_with_mechanisms_starts_from_the_one_without() -> None:
     flat = {"fibre": "x", "constants.reference_length_m": 1.0, "constants.f0_n": 1.0}
     source = load_fibre("18Dec2017a", BASE)

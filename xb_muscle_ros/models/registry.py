@@ -109,7 +109,8 @@ class HillRow(NamedTuple):
 def _same_as(row: Row | HillRow, name: str) -> str:
     """Name of the compiled module: models of the same blocks share it, whatever they are called."""
     bare = row._replace(extras=())
-    same = next((known for known, blocks in MODELS.items() if blocks == bare), name.split(SEPARATOR)[0])
+    own = "_with_".join(part for part in name.split(SEPARATOR) if part not in EXTRAS)
+    same = next((known for known, blocks in MODELS.items() if blocks == bare), own)
     return "_with_".join([same, *(extra.name for extra in row.extras)])
 
 
