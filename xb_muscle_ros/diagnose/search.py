@@ -21,6 +21,9 @@ PENALTY = 3.0
 _WORTH = 0.15
 # A candidate is fitted if the line promises this share of what the best one promises, and this much of the cost.
 _PROMISE, _LEAST_GAIN = 0.1, 6.0
+# Half-sarcomeres are the same whichever is the stronger: their effect grows with the square of the spread, so that a
+# line from its absence says little.
+_NO_LINE = (Name.HALF_SARCOMERE_SPREAD,)
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,7 @@ class Effort:
     closure: int = 2
 
 
-QUICK = Effort(steps=2, candidates=6, later=3, most=12, folds=3, rivals=2, draws=400, closure=1)
+QUICK = Effort(steps=2, candidates=6, later=3, most=12, folds=3, rivals=2, draws=400, closure=2)
 
 
 @dataclass
@@ -196,8 +199,8 @@ class Searcher:
 
 def _promising(candidates: Sequence[Screened], cost: float, most: int) -> list[Screened]:
     """Candidates worth a fit: those that only a fit can tell, and the most promising of the others."""
-    blind = [s for s in candidates if np.isnan(s.gain)]
-    told = [s for s in candidates if not np.isnan(s.gain)]
+    blind = [s for s in candidates if np.isnan(s.gain) or s.name in _NO_LINE]
+    told = [s for s in candidates if not np.isnan(s.gain) and s.name not in _NO_LINE]
     best = max((s.gain for s in told), default=0.0)
     return [*blind, *(s for s in told if s.gain >= max(_PROMISE * best, _LEAST_GAIN, 0.01 * cost))][: most + len(blind)]
 

@@ -61,10 +61,12 @@ class Settling(NamedTuple):
     Attributes:
         rate: at rest, no state changes faster than this, 1/s.
         step_s: fixed step, s; None: variable steps of any size.
+        tolerance: error of a variable step, in units of the states.
     """
 
     rate: float
     step_s: float | None
+    tolerance: float = 1e-8
 
 
 class Representation(ABC):

@@ -143,8 +143,9 @@ class Composition(Model):
 
     @property
     def settling(self) -> Settling:
-        """See the base class."""
-        return self.representation.settling
+        """See the base class; half-sarcomeres creep against each other for seconds, which needs no such small steps."""
+        settling = self.representation.settling
+        return settling if self.in_series is None else settling._replace(tolerance=1e-6)
 
     @property
     def in_series(self) -> InSeries | None:

@@ -21,7 +21,6 @@ Array = npt.NDArray[np.float64]
 GUARD = 1e-4
 # Rows of scratch: four for the loops, the others for a model's step.
 SCRATCH_ROWS = 14
-_SETTLE_TOLERANCE = 1e-8
 _LONGEST_SETTLING_S = 1e6
 
 # Compiled modules that have taken a step in this process.
@@ -253,7 +252,7 @@ class Muscle:
         length = float(state[-3])
         step_s = self._settling.step_s
         if step_s is None:
-            return self._advance(state, length, calcium_um, duration_s, 1e-6, _SETTLE_TOLERANCE)
+            return self._advance(state, length, calcium_um, duration_s, 1e-6, self._settling.tolerance)
         count = max(1, math.ceil(duration_s / step_s - 1e-9))
         dt = np.full(count, duration_s / count)
         held = np.full(count + 1, calcium_um)
