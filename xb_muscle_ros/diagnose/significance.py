@@ -24,8 +24,9 @@ from xb_muscle_ros.errors import UserError
 
 Array = npt.NDArray[np.float64]
 
-# A mismatch below this is of no use to anyone, F0, whatever its p-value.
-FLOOR_F0 = 0.003
+# A mismatch below this is of no use to anyone, F0, whatever its p-value, if it lasts so long; a shorter one has to be
+# larger as the root of the time: a few milliseconds at the end of a fast ramp are the steps' and the sampling's.
+FLOOR_F0, _FLOOR_S = 0.003, 0.1
 _SIGMAS = 3.0
 # Numbers held at a time.
 _AT_ONCE = 3_000_000
@@ -149,12 +150,19 @@ def significance(
         rms_f0=found,
         mean_f0=mean(cells, values)[:, 0],
         p_value=p[:-1],
-        floor_f0=np.maximum(floor_f0, _SIGMAS * np.sqrt(np.mean(of_cells**2, axis=1))),
+        floor_f0=np.maximum(_practical(cells, floor_f0), _SIGMAS * np.sqrt(np.mean(of_cells**2, axis=1))),
         overall_rms_f0=overall,
         overall_null_f0=float(np.quantile(of_whole, 0.95)),
         overall_p=float(p.min()),
         practical_f0=floor_f0,
     )
+
+
+def _practical(cells: Sequence[Cell], floor_f0: float) -> Array:
+    """The practical floor of each cell, F0."""
+    lasting = np.array([max(cell.end_s - cell.start_s, 1e-3) for cell in cells])
+    floors: Array = floor_f0 * np.sqrt(np.maximum(_FLOOR_S / lasting, 1.0))
+    return floors
 
 
 def null_residuals(

@@ -12,16 +12,20 @@ from xb_muscle_ros.diagnose.crossval import HeldOut, difference
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name, Verdict
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.search import Search
+from xb_muscle_ros.diagnose.study import Explanation
 
 # Independent differences that a trial tells of, as a rule: residuals of a muscle hang together over a whole phase.
 _TOLD_BY_TRIAL = 2.0
 # A rival is out of the race below this share of the best one's weight.
 _TIE = 0.05
-# Shares of the mismatch's mean square that an answer explains at least, and that a mechanism explains of what was left
-# before it.
-_EXPLAINED, _OWN_SHARE = 0.6, 0.4
-# A mechanism's own doing is at least this large, F0.
-_OWN_F0 = 0.002
+# Share of the mismatch's mean square that the first name explains all by itself; or else all names together, and the
+# first one of what the others leave. Effects that nobody thought of are mended in part by many a pair.
+_ALONE, _TOGETHER, _OF_THE_REST = 0.75, 0.9, 0.85
+# Share that is gone where the mismatch was located.
+_CLEANED = 0.7
+# A name belongs to the answer if without it this share of the mismatch would come back; a mechanism also has a doing of
+# its own of at least this size, F0, and this share of what the others leave.
+_PART, _OWN_F0, _OWN_SHARE = 0.05, 0.002, 0.4
 # Of the held-out gain of a discrepancy without physics, an answer reaches this share.
 _OF_FLEXIBLE = 0.5
 # A start whose difference is within this factor of the refitted one needed no refit.
@@ -105,8 +109,11 @@ def decide(e: Evidence) -> Decision:
     if not explanation.names:
         return Decision(Verdict.UNEXPLAINED, (), None, _sure(1.0 - e.p_value), (), ())
     share = explained(search.base, search.final, e.noise_f0)
-    mechanisms = _by_importance(search, [m for m in explanation.mechanisms if _has_own_doing(search, m, e.noise_f0)])
-    faults = _by_importance(search, explanation.faults)
+    part = [n for n in explanation.names if _comes_back(search, n, e.noise_f0) >= _PART]
+    mechanisms = _by_importance(
+        search, [n for n in part if n in explanation.mechanisms and _has_own_doing(search, n, e.noise_f0)]
+    )
+    faults = _by_importance(search, [n for n in part if n in explanation.faults])
     lead = (mechanisms or faults or list(explanation.names))[0]
     weights = weights_against(search, lead, len(search.study.trials))
     ties = tuple(n for n, w in weights.items() if n is not lead and w >= _TIE * weights[lead])
@@ -116,7 +123,7 @@ def decide(e: Evidence) -> Decision:
         tuple(dict.fromkeys((*mechanisms, *faults, *ties))) if mechanisms else tuple(dict.fromkeys((*faults, *ties)))
     )
     family = FAMILY[lead] if all(FAMILY[n] == FAMILY[lead] for n in ties) else None
-    if not mechanisms and not faults:
+    if not (mechanisms or faults) or not _explains(search, lead, share, e.noise_f0).passed:
         return Decision(Verdict.UNEXPLAINED, (), None, confidence, checks, ties)
     if family is None:
         return Decision(Verdict.AMBIGUOUS, answer, None, confidence, checks, ties)
@@ -153,6 +160,28 @@ def _has_own_doing(search: Search, name: Name, noise_f0: float) -> bool:
     return math.sqrt(own) >= _OWN_F0 and explained(without, search.final, noise_f0) >= _OWN_SHARE
 
 
+def _comes_back(search: Search, name: Name, noise_f0: float) -> float:
+    """Share of the base's mismatch that is there again without a name."""
+    without = search.fits.get(search.final.explanation.without(name).label, search.base)
+    excess = search.base.rmsd_f0**2 - noise_f0**2
+    return (without.rmsd_f0**2 - search.final.rmsd_f0**2) / excess if excess > 0.0 else 0.0
+
+
+def _explains(search: Search, lead: Name, share: float, noise_f0: float) -> Check:
+    """Whether the answer explains enough, and its first name not only beside others."""
+    single = search.fits.get(Explanation().plus(lead).label, search.base)
+    alone = explained(search.base, single, noise_f0)
+    without = search.fits.get(search.final.explanation.without(lead).label, search.base)
+    of_rest = explained(without, search.final, noise_f0)
+    passed = alone >= _ALONE or (share >= _TOGETHER and of_rest >= _OF_THE_REST)
+    return Check(
+        f"it explains {100 * _ALONE:.0f} % of the mismatch alone, or {100 * _TOGETHER:.0f} % with others and "
+        f"{100 * _OF_THE_REST:.0f} % of what these leave",
+        passed,
+        f"{100 * alone:.0f} % alone, {100 * share:.0f} % in all, {100 * of_rest:.0f} % of the rest",
+    )
+
+
 def weights_against(search: Search, lead: Name, trials: int) -> dict[Name, float]:
     """Weights of a name and of all that were fitted in its place; they sum to 1.
 
@@ -176,14 +205,10 @@ def weights_against(search: Search, lead: Name, trials: int) -> dict[Name, float
 def _checks(e: Evidence, lead: Name, share: float, weights: Mapping[Name, float], physics: bool) -> tuple[Check, ...]:
     checks = [
         Check("the mismatch is no noise (bootstrap p < 0.01)", e.p_value < 0.01, f"p = {e.p_value:.2g}"),
-        Check(
-            f"the answer explains at least {100 * _EXPLAINED:.0f} % of the mismatch",
-            share >= _EXPLAINED,
-            f"{100 * share:.0f} % of its mean square",
-        ),
+        _explains(e.search, lead, share, e.noise_f0),
         Check(
             "the places where the mismatch was found are clean afterwards",
-            e.cleaned >= _EXPLAINED,
+            e.cleaned >= _CLEANED,
             f"{100 * e.cleaned:.0f} % of the mean square there is gone",
         ),
     ]
