@@ -54,7 +54,7 @@ class Case(NamedTuple):
         noise_sd: of each trial, F0.
         refitted: what a refit of the plain base leaves of the noise-free recording.
         before: RMS difference to the base with the true constants, F0.
-        beside_nuisances: RMS left when usual faults of the measurement may explain it as well, F0.
+        beside_nuisances: what is left when usual faults of the measurement may explain it as well, F0, by trial.
     """
 
     spec: Spec
@@ -68,7 +68,7 @@ class Case(NamedTuple):
     noise_sd: list[float]
     refitted: Refitted
     before: float
-    beside_nuisances: float
+    beside_nuisances: list[Array]
 
 
 def make_case(spec: Spec, seed: int, number: int) -> Case:
@@ -219,13 +219,15 @@ def size_class(achieved: float) -> float:
 
 
 def cells(case: Case) -> list[dict[str, JsonValue]]:
-    """RMS of what a refit leaves in every phase of every trial, F0."""
+    """RMS of what is left in every phase of every trial, F0: by a refit, and by one that may use faults as well."""
     out: list[dict[str, JsonValue]] = []
-    for i, (trial, left) in enumerate(zip(case.study, case.refitted.left, strict=True)):
+    for i, trial in enumerate(case.study):
         for phase in trial.phases:
             first, last = (round(t * 1e3) for t in (phase.start_s, phase.end_s))
-            part = left[first : last + 1]
-            out.append({"trial": trial_name(i), "phase": phase.name, "rms_f0": float(np.sqrt(np.mean(part**2)))})
+            parts = (case.refitted.left[i][first : last + 1], case.beside_nuisances[i][first : last + 1])
+            by_refit, beside = (float(np.sqrt(np.mean(part**2))) for part in parts)
+            name = trial_name(i)
+            out.append({"trial": name, "phase": phase.name, "rms_f0": by_refit, "beside_nuisances_f0": beside})
     return out
 
 

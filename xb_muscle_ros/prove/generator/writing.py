@@ -51,7 +51,7 @@ def key_entry(case: Case, name: str) -> dict[str, JsonValue]:
         "size_f0": achieved,
         "size_class_f0": size_class(achieved) if spec.kind in ("single", "pair", "outside") else None,
         "before_refit_f0": case.before,
-        "beside_nuisances_f0": case.beside_nuisances,
+        "beside_nuisances_f0": float(np.sqrt(np.mean(np.concatenate(case.beside_nuisances) ** 2))),
         "concealed": [{"label": c.label, "scale": c.scale, "shape": c.shape} for c in case.concealed],
         "faults": _of_faults(case.faults),
         "values": case.values,
