@@ -15,7 +15,12 @@ from xb_muscle_ros.prove.judging import Judged
 
 Array = npt.NDArray[np.float64]
 
-_NAMES = [name.value for name in Name]
+_FAMILIES = list(dict.fromkeys(FAMILY.values()))
+_IS_PHYSICS = {name.value for name in MECHANISMS}
+# Families side by side, faults behind.
+_NAMES = sorted(
+    (name.value for name in Name), key=lambda name: (name not in _IS_PHYSICS, _FAMILIES.index(FAMILY[Name(name)]))
+)
 _TRUTHS = [*_NAMES, "outside", "null"]
 _ANSWERS = [*_NAMES, Verdict.UNEXPLAINED.value, Verdict.PARAMETERS.value, Verdict.NONE.value, "other"]
 
@@ -92,8 +97,7 @@ def _frames(axes: Any, truths: Sequence[str], answers: Sequence[str]) -> None:
             Rectangle((start - 0.5, start - 0.5), size, size, fill=False, edgecolor=SECOND, linewidth=1.1, zorder=3)
         )
         start = end
-    mechanisms = {name.value for name in MECHANISMS}
-    physics = sum(name in mechanisms for name in names)
+    physics = sum(name in _IS_PHYSICS for name in names)
     for edge in {physics, len(names)}:
         axes.axhline(edge - 0.5, color=DATA, linewidth=0.7)
         axes.axvline(edge - 0.5, color=DATA, linewidth=0.7)
@@ -121,7 +125,7 @@ def _by_size(path: Path, judged: Sequence[Judged], tree: dict[str, Any]) -> Path
         left.set_xlabel("Effect after refit, class (% F$_0$)")
         left.set_ylabel("Single effects (%)")
         left.set_ylim(-3.0, 103.0)
-        left.legend(loc="upper left", frameon=False)
+        left.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, borderpad=0.0)
         _gains(right, judged)
         save(made, path)
     return path
@@ -144,7 +148,7 @@ def _gains(axes: Any, judged: Sequence[Judged]) -> None:
     axes.set_xlabel("Effect after refit (% F$_0$)")
     axes.set_ylabel("Held-out gain / gain of the true model")
     if named:
-        axes.legend(loc="lower right", frameon=False)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, borderpad=0.0)
 
 
 def _calibration(path: Path, found: dict[str, Any]) -> Path:
@@ -160,8 +164,8 @@ def _calibration(path: Path, found: dict[str, Any]) -> Path:
         )  # fmt: skip
         for row in found["bins"]:
             axes.annotate(
-                f"n = {row['n']}", (row["mean_confidence"], row["value"]), (4.0, 4.0), textcoords="offset points",
-                fontsize=6.5,
+                f"n = {row['n']}", (row["mean_confidence"], row["value"]), (-4.0 if row["mean_confidence"] > 0.85 else 4.0, 4.0), textcoords="offset points",
+                fontsize=6.5, ha="right" if row["mean_confidence"] > 0.85 else "left",
             )  # fmt: skip
         axes.set_xlim(0.0, 1.03)
         axes.set_ylim(-0.03, 1.05)

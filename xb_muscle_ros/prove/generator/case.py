@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,6 @@ from xb_muscle_ros.prove.generator.refit import Refit, Refitted
 from xb_muscle_ros.prove.generator.study import Planned, plan
 from xb_muscle_ros.prove.generator.truth import Truth, study_forces, trial_force
 from xb_muscle_ros.prove.generator.world import Stimulus, World, isometric
-from xb_muscle_ros.work import JsonValue
 
 Array = npt.NDArray[np.float64]
 
@@ -218,9 +217,9 @@ def size_class(achieved: float) -> float:
     return max((size for size in SIZES if achieved >= _BELOW * size), default=0.0)
 
 
-def cells(case: Case) -> list[dict[str, JsonValue]]:
+def cells(case: Case) -> list[dict[str, Any]]:
     """RMS of what is left in every phase of every trial, F0: by a refit, and by one that may use faults as well."""
-    out: list[dict[str, JsonValue]] = []
+    out: list[dict[str, Any]] = []
     for i, trial in enumerate(case.study):
         for phase in trial.phases:
             first, last = (round(t * 1e3) for t in (phase.start_s, phase.end_s))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from xb_muscle_ros.prove.generator.recording import Faults
 from xb_muscle_ros.prove.generator.world import SAMPLE_S
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.trial import Trial, TrialFacts
-from xb_muscle_ros.work import JsonValue
 
 
 def write_case(folder: Path, case: Case, fibre: str, method: str) -> None:
@@ -37,7 +37,7 @@ def write_case(folder: Path, case: Case, fibre: str, method: str) -> None:
     write_text(folder / "fibre.yaml", fibre_text(fibre, case.spec.model, method, case.nominal))
 
 
-def key_entry(case: Case, name: str) -> dict[str, JsonValue]:
+def key_entry(case: Case, name: str) -> dict[str, Any]:
     """Everything that is true of a case, as JSON can hold it."""
     spec = case.spec
     achieved = case.refitted.rms
@@ -66,7 +66,7 @@ def key_entry(case: Case, name: str) -> dict[str, JsonValue]:
     }
 
 
-def _of_faults(faults: Faults) -> dict[str, JsonValue]:
+def _of_faults(faults: Faults) -> dict[str, Any]:
     return {
         "pca_shift": {f"{pca:g}": shift for pca, shift in faults.pca_shift.items()},
         "length_gain": faults.length_gain,
