@@ -36,7 +36,10 @@ def test_generator_names_only_what_it_may() -> None:
         for module in _imported(ast.parse(file.read_text(encoding="utf-8"))):
             if module.startswith("xb_muscle_ros."):
                 inner = module.removeprefix("xb_muscle_ros.")
-                assert any(f"{inner}.".startswith(f"{name}.") for name in ALLOWED) or inner == "diagnose", (file, module)
+                assert any(f"{inner}.".startswith(f"{name}.") for name in ALLOWED) or inner == "diagnose", (
+                    file,
+                    module,
+                )
 
 
 def test_generator_loads_no_model_of_the_tool() -> None:

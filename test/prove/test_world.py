@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -24,7 +26,7 @@ def test_force_does_not_depend_on_step_and_bins(model: str, worlds: dict[str, Wo
 
 def test_step_is_of_second_order(worlds: dict[str, World], study: list[Stimulus]) -> None:
     forces = [simulate(worlds["3state_coop"], study[1], mesh=Mesh(steps=steps)).force for steps in (2, 4, 8)]
-    coarse, fine = (np.sqrt(np.mean((a - b) ** 2)) for a, b in zip(forces[:-1], forces[1:], strict=True))
+    coarse, fine = (np.sqrt(np.mean((a - b) ** 2)) for a, b in itertools.pairwise(forces))
     assert 3.0 < coarse / fine < 5.0
 
 

@@ -100,7 +100,7 @@ def _located(truth: Mapping[str, Any], found: Mapping[str, Any], size: str) -> b
 
 
 def _gain(truth: Mapping[str, Any], found: Mapping[str, Any]) -> float | None:
-    before, after = found.get("before_heldout_f0"), found.get("after_heldout_f0")
-    if before is None or after is None or before <= truth["noise_rms_f0"]:
+    before, after, noise = found.get("before_heldout_f0"), found.get("after_heldout_f0"), truth["noise_rms_f0"]
+    if before is None or after is None or noise is None or before <= noise:
         return None
-    return float((before - after) / (before - truth["noise_rms_f0"]))
+    return float((before - after) / (before - noise))

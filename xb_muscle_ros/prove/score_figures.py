@@ -163,9 +163,10 @@ def _calibration(path: Path, found: dict[str, Any]) -> Path:
             linestyle="none", label="found (95 % interval)",
         )  # fmt: skip
         for row in found["bins"]:
+            right = row["mean_confidence"] > 0.85
             axes.annotate(
-                f"n = {row['n']}", (row["mean_confidence"], row["value"]), (-4.0 if row["mean_confidence"] > 0.85 else 4.0, 4.0), textcoords="offset points",
-                fontsize=6.5, ha="right" if row["mean_confidence"] > 0.85 else "left",
+                f"n = {row['n']}", (row["mean_confidence"], row["value"]), (-4.0 if right else 4.0, 4.0),
+                textcoords="offset points", fontsize=6.5, ha="right" if right else "left",
             )  # fmt: skip
         axes.set_xlim(0.0, 1.03)
         axes.set_ylim(-0.03, 1.05)

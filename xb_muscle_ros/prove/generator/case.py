@@ -101,7 +101,7 @@ def _attempt(spec: Spec, random: np.random.Generator) -> Case | None:
             return None
         refit = Refit(base, [trial.stimulus() for trial in study])
         faults = draw_faults(spec.labels[0], random, study) if spec.kind == "fault" else Faults()
-        concealed, forces, refitted = _conceal(spec, concealed, base, study, faults, refit)
+        concealed, forces, refitted = conceal(spec, concealed, base, study, faults, refit)
         if _usable(study, forces):
             return _finished(spec, random, fibre, given, base, study, concealed, faults, forces, refit, refitted)
         if not concealed:
@@ -146,7 +146,7 @@ def _isometric_of(concealed: Sequence[Concealed], base: World) -> Callable[[floa
     return force
 
 
-def _conceal(
+def conceal(
     spec: Spec, concealed: list[Concealed], base: World, study: list[Planned], faults: Faults, refit: Refit
 ) -> tuple[list[Concealed], list[Array], Refitted]:
     """The effects at the scale asked for, the noise-free recording, and what a refit leaves of it."""
@@ -217,16 +217,15 @@ def size_class(achieved: float) -> float:
     return max((size for size in SIZES if achieved >= _BELOW * size), default=0.0)
 
 
-def cells(case: Case) -> list[dict[str, Any]]:
+def cells(study: Sequence[Planned], left: Sequence[Array], beside: Sequence[Array]) -> list[dict[str, Any]]:
     """RMS of what is left in every phase of every trial, F0: by a refit, and by one that may use faults as well."""
     out: list[dict[str, Any]] = []
-    for i, trial in enumerate(case.study):
+    for i, trial in enumerate(study):
         for phase in trial.phases:
             first, last = (round(t * 1e3) for t in (phase.start_s, phase.end_s))
-            parts = (case.refitted.left[i][first : last + 1], case.beside_nuisances[i][first : last + 1])
-            by_refit, beside = (float(np.sqrt(np.mean(part**2))) for part in parts)
-            name = trial_name(i)
-            out.append({"trial": name, "phase": phase.name, "rms_f0": by_refit, "beside_nuisances_f0": beside})
+            sizes = [float(np.sqrt(np.mean(part[i][first : last + 1] ** 2))) for part in (left, beside)]
+            row = {"trial": trial_name(i), "phase": phase.name}
+            out.append({**row, "rms_f0": sizes[0], "beside_nuisances_f0": sizes[1]})
     return out
 
 

@@ -62,7 +62,7 @@ def key_entry(case: Case, name: str) -> dict[str, Any]:
             / sum(force.size for force in case.recorded)
         ),
         "pca": {trial_name(i): planned.pca for i, planned in enumerate(case.study)},
-        "cells": cells(case),
+        "cells": cells(case.study, case.refitted.left, case.beside_nuisances),
     }
 
 
