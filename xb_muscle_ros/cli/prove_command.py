@@ -10,6 +10,7 @@ from xb_muscle_ros.cli.common import add_work, work_options_of
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
+    from xb_muscle_ros.work import Options
 
 
 def add(subparsers: Subparsers) -> None:
@@ -29,6 +30,15 @@ def add(subparsers: Subparsers) -> None:
     make.add_argument("--method", default="gaussian", help="method that the fibre files name (default: gaussian)")
     add_work(make)
     make.set_defaults(run=_make)
+    spike = steps.add_parser("spike", help="add the force of concealed effects to a recorded study")
+    spike.add_argument("bags", nargs="+", type=Path, metavar="BAG", help="trials of one fibre, or a folder of them")
+    spike.add_argument("--fiber", "--fibre", dest="fiber", type=Path, required=True, metavar="FILE", help="fibre file")
+    spike.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the benchmark")
+    spike.add_argument("--cases", type=int, required=True, metavar="N", help="how many")
+    spike.add_argument("--seed", type=int, required=True, metavar="S", help="decides everything: keep it as the key")
+    spike.add_argument("--key", type=Path, required=True, metavar="FILE", help="file for the truths, outside of DIR")
+    add_work(spike)
+    spike.set_defaults(run=_spike)
     run = steps.add_parser("run", help="diagnose every case, without the key")
     run.add_argument("folder", type=Path, metavar="DIR", help="folder of the benchmark")
     run.add_argument("--out", type=Path, required=True, metavar="RESULTS", help="folder for the diagnoses")
@@ -45,17 +55,42 @@ def add(subparsers: Subparsers) -> None:
 
 def _make(arguments: argparse.Namespace) -> int:
     """Make a benchmark and print the key's hash."""
-    from xb_muscle_ros.errors import UserError
     from xb_muscle_ros.prove.make import make
+
+    options = _checked(arguments, "prove make")
+    sealed = make(arguments.out, arguments.cases, arguments.seed, arguments.key, arguments.method, options)
+    return _sealed(arguments, sealed)
+
+
+def _spike(arguments: argparse.Namespace) -> int:
+    """Make spike-ins and print the key's hash."""
+    from xb_muscle_ros.prove.spike import spike
+
+    options = _checked(arguments, "prove spike")
+    sealed = spike(
+        arguments.bags, arguments.fiber, arguments.out, arguments.cases, arguments.seed, arguments.key, options
+    )
+    return _sealed(arguments, sealed)
+
+
+def _journal(arguments: argparse.Namespace) -> Path:
+    """Kept beside the key, because it holds what the key does."""
+    key: Path = arguments.key
+    return key.with_name(f".{key.name}.journal")
+
+
+def _checked(arguments: argparse.Namespace, label: str) -> Options:
+    from xb_muscle_ros.errors import UserError
 
     if not 1 <= arguments.cases <= 9999:
         raise UserError(f"--cases is {arguments.cases}; allowed is 1 to 9999")
     if arguments.seed < 0:
         raise UserError(f"--seed is {arguments.seed}; allowed is 0 and above")
-    journal = arguments.key.with_name(f".{arguments.key.name}.journal")
-    options = work_options_of(arguments, "prove make", journal)
-    sealed = make(arguments.out, arguments.cases, arguments.seed, arguments.key, arguments.method, options)
-    journal.unlink(missing_ok=True)
+    return work_options_of(arguments, label, _journal(arguments))
+
+
+def _sealed(arguments: argparse.Namespace, sealed: str) -> int:
+    _journal(arguments).unlink(missing_ok=True)
     print(f"{arguments.out}: {arguments.cases} cases; key {arguments.key}, SHA-256 {sealed}")
     return 0
 

@@ -73,9 +73,9 @@ def seal(out: Path, key: Path, seed: int, entries: list[Any], about: str, method
 def _finished(out: Path, cases: int, seed: int, key: Path) -> str:
     """The hash of a benchmark that is made already, if it is the one asked for."""
     public = load_benchmark(out)
-    if key.exists() and digest(key) == public["key_sha256"] and len(public["cases"]) == cases:
-        if json.loads(key.read_text(encoding="utf-8"))["seed"] == seed:
-            return str(public["key_sha256"])
+    known = key.exists() and digest(key) == public["key_sha256"] and len(public["cases"]) == cases
+    if known and json.loads(key.read_text(encoding="utf-8"))["seed"] == seed:
+        return str(public["key_sha256"])
     raise UserError(f"{out} holds another benchmark already; choose another folder or delete it")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy.signal import lfilter
 
 from xb_muscle_ros.prove.generator.world import SAMPLE_S, Stimulus
 
@@ -22,9 +23,7 @@ def saturating_drag(length: Array, drag_s: float, bend: float) -> Array:
 
 
 def leaky(drive: Array, tau_s: float) -> Array:
-    """X' = drive - x/tau from 0, exact for a drive that is constant between samples; shape (n,)."""
-    from scipy.signal import lfilter
-
+    """Solution of x' = drive - x/tau from 0, exact for a drive that is constant between samples; shape (n,)."""
     left = np.exp(-SAMPLE_S / tau_s)
     driven = drive.copy()
     driven[0] = 0.0
@@ -74,7 +73,7 @@ def bound_titin(length: Array, share: float, stiffness: float, contour: float, r
 
 def stiffened_titin(length: Array, share: float, stiffness: float, steepness: float) -> Array:
     """Exponential spring from rest length on, stiffer by the share of calcium that is bound."""
-    return share * stiffness * np.expm1(steepness * np.maximum(length, 0.0)) / steepness
+    return np.asarray(share * stiffness * np.expm1(steepness * np.maximum(length, 0.0)) / steepness)
 
 
 def titin_share(stimulus: Stimulus, shape: dict[str, float]) -> float:

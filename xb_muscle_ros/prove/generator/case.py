@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,6 @@ from xb_muscle_ros.prove.generator.refit import Refit, Refitted
 from xb_muscle_ros.prove.generator.study import Planned, plan
 from xb_muscle_ros.prove.generator.truth import Truth, study_forces, trial_force
 from xb_muscle_ros.prove.generator.world import Stimulus, World, isometric
-from xb_muscle_ros.work import JsonValue
 
 Array = npt.NDArray[np.float64]
 
@@ -54,7 +53,7 @@ class Case(NamedTuple):
         noise_sd: of each trial, F0.
         refitted: what a refit of the plain base leaves of the noise-free recording.
         before: RMS difference to the base with the true constants, F0.
-        beside_nuisances: RMS left when usual faults of the measurement may explain it as well, F0.
+        beside_nuisances: what is left when usual faults of the measurement may explain it as well, F0, by trial.
     """
 
     spec: Spec
@@ -68,7 +67,7 @@ class Case(NamedTuple):
     noise_sd: list[float]
     refitted: Refitted
     before: float
-    beside_nuisances: float
+    beside_nuisances: list[Array]
 
 
 def make_case(spec: Spec, seed: int, number: int) -> Case:
@@ -102,7 +101,7 @@ def _attempt(spec: Spec, random: np.random.Generator) -> Case | None:
             return None
         refit = Refit(base, [trial.stimulus() for trial in study])
         faults = draw_faults(spec.labels[0], random, study) if spec.kind == "fault" else Faults()
-        concealed, forces, refitted = _conceal(spec, concealed, base, study, faults, refit)
+        concealed, forces, refitted = conceal(spec, concealed, base, study, faults, refit)
         if _usable(study, forces):
             return _finished(spec, random, fibre, given, base, study, concealed, faults, forces, refit, refitted)
         if not concealed:
@@ -147,7 +146,7 @@ def _isometric_of(concealed: Sequence[Concealed], base: World) -> Callable[[floa
     return force
 
 
-def _conceal(
+def conceal(
     spec: Spec, concealed: list[Concealed], base: World, study: list[Planned], faults: Faults, refit: Refit
 ) -> tuple[list[Concealed], list[Array], Refitted]:
     """The effects at the scale asked for, the noise-free recording, and what a refit leaves of it."""
@@ -218,14 +217,15 @@ def size_class(achieved: float) -> float:
     return max((size for size in SIZES if achieved >= _BELOW * size), default=0.0)
 
 
-def cells(case: Case) -> list[dict[str, JsonValue]]:
-    """RMS of what a refit leaves in every phase of every trial, F0."""
-    out: list[dict[str, JsonValue]] = []
-    for i, (trial, left) in enumerate(zip(case.study, case.refitted.left, strict=True)):
+def cells(study: Sequence[Planned], left: Sequence[Array], beside: Sequence[Array]) -> list[dict[str, Any]]:
+    """RMS of what is left in every phase of every trial, F0: by a refit, and by one that may use faults as well."""
+    out: list[dict[str, Any]] = []
+    for i, trial in enumerate(study):
         for phase in trial.phases:
             first, last = (round(t * 1e3) for t in (phase.start_s, phase.end_s))
-            part = left[first : last + 1]
-            out.append({"trial": trial_name(i), "phase": phase.name, "rms_f0": float(np.sqrt(np.mean(part**2)))})
+            sizes = [float(np.sqrt(np.mean(part[i][first : last + 1] ** 2))) for part in (left, beside)]
+            row = {"trial": trial_name(i), "phase": phase.name}
+            out.append({**row, "rms_f0": sizes[0], "beside_nuisances_f0": sizes[1]})
     return out
 
 

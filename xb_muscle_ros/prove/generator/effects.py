@@ -205,7 +205,7 @@ def _damaged(truth: Truth, scale: float, shape: Shape) -> Truth:
         # Harm is done by stretch beyond rest, and the more so the more calcium is there.
         active = stimulus.calcium / (1.0 + stimulus.calcium)
         longer = np.maximum(np.diff(np.maximum(stimulus.length, 0.0), prepend=stimulus.length[0]), 0.0)
-        return active * np.cumsum(longer)
+        return np.asarray(active * np.cumsum(longer))
 
     def act(study: Sequence[Stimulus], i: int) -> Acting:
         before = sum(float(stretched(earlier)[-1]) for earlier in study[:i])
@@ -266,7 +266,10 @@ _ROWS = (
         Name.THICK_FILAMENT_COOPERATIVITY.value, "J2, 1/s", ("2state_coop",), 40.0, 600.0,
         _between(JF=(100.0, 500.0), half_force=(0.4, 1.2)), _regulated,
     ),
-    Effect(Name.TEMPERATURE.value, "change, °C", ("3state_coop", "2state_coop"), 4.0, 10.0, _between(sign=(-1.0, 1.0)), _warm),
+    Effect(
+        Name.TEMPERATURE.value, "change, °C", ("3state_coop", "2state_coop"), 4.0, 10.0, _between(sign=(-1.0, 1.0)),
+        _warm,
+    ),
     Effect(
         Name.PHOSPHATE.value, "detachment before the stroke, 1/s", ("3state_coop", "2state_coop"), 30.0, 400.0, _none,
         _set(At.PHOSPHATE_RATE),

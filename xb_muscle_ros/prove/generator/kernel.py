@@ -9,35 +9,32 @@ less than a bin, and bins are renumbered when it exceeds that.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, TypeVar, cast
-
-import numba
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.prove.generator.layout import At, Series, Thick, Thin
+from xb_muscle_ros.prove.generator.layout import At, Thick
+from xb_muscle_ros.prove.generator.pieces import (
+    attachment,
+    compiled,
+    head_force,
+    head_stiffness,
+    overlap,
+    series_length,
+    series_slope,
+    thick,
+    thin,
+)
 
 Array = npt.NDArray[np.float64]
-F = TypeVar("F", bound=Callable[..., Any])
 
 # The loop knows constants of a module, but not the members of an enumeration.
 _F, _W, _K11, _K12, _K21, _K22 = (int(i) for i in (At.F, At.W, At.K11, At.K12, At.K21, At.K22))
-_KON, _KOFF, _KOOP, _KAPPA, _N = (int(i) for i in (At.KON, At.KOFF, At.KOOP, At.KAPPA, At.N))
-_TAU_ACT, _AFFINITY = int(At.TAU_ACT), int(At.AFFINITY)
-_J1, _J2, _JF, _JS = (int(i) for i in (At.J1, At.J2, At.JF, At.J_SATURATION))
-_KSE, _KSE0, _SF, _SL, _GAMMA = (int(i) for i in (At.KSE, At.KSE0, At.SERIES_FORCE, At.SERIES_LENGTH, At.GAMMA))
+_J1, _J2, _GAMMA, _THICK = (int(i) for i in (At.J1, At.J2, At.GAMMA, At.THICK))
 _TK, _TX, _TS, _TB = (int(i) for i in (At.TEAR_RATE, At.TEAR_STRAIN, At.TEAR_STEEPNESS, At.REBIND_RATE))
 _CURVE, _PI = int(At.HEAD_CURVATURE), int(At.PHOSPHATE_RATE)
-_LS, _LB, _OS, _OE = (int(i) for i in (At.LATTICE_SLOPE, At.LATTICE_BEST, At.OVERLAP_SLOPE, At.OVERLAP_EDGE))
 _WK, _WR, _WX, _WL = (int(i) for i in (At.WEAK_STIFFNESS, At.WEAK_RATE, At.WEAK_STRAIN, At.WEAK_LAG))
 _CC, _CT, _UK = (int(i) for i in (At.CREEP, At.CREEP_TIME, At.UNIT_STIFFNESS))
-_THIN, _THICK, _SERIES = int(At.THIN), int(At.THICK), int(At.SERIES)
-_SIGMOID, _REGULATED = int(Thin.SIGMOID), int(Thick.FORCE_DEPENDENT)
-_EXPONENTIAL, _RIGID = int(Series.EXPONENTIAL), int(Series.RIGID)
-
-# Bound heads at which affinity is as the constants say.
-_USUAL_Q0 = 0.2
+_REGULATED = int(Thick.FORCE_DEPENDENT)
 
 # Rows of a half-sarcomere's state.
 N_ON, DRX, TORN, LENGTH, OFFSET, WEAK_SITES, WEAK_FORCE, Q0, FORCE, LAST_MOVE = range(10)
@@ -49,118 +46,17 @@ SHARED = 3
 CALCIUM, ATTACHMENT, SWITCH_OFF, RECRUITMENT = range(4)
 
 
-def _compiled(function: F) -> F:
-    return cast(F, numba.njit(cache=True, error_model="numpy")(function))
-
-
-@_compiled
-def _head_force(z: float, curvature: float) -> float:
-    """Force of a head of elongation z (1: one power stroke): stiffer beyond 1, softer when compressed; 1 at z = 1."""
-    if z > 1.0:
-        return z + curvature * (z - 1.0) ** 2 / (1.0 + 0.15 * (z - 1.0))
-    if z < 0.0:
-        return z / (1.0 - 4.0 * curvature * z)
-    return z
-
-
-@_compiled
-def _head_stiffness(z: float, curvature: float) -> float:
-    if z > 1.0:
-        y = z - 1.0
-        return 1.0 + curvature * y * (2.0 + 0.15 * y) / (1.0 + 0.15 * y) ** 2
-    if z < 0.0:
-        return 1.0 / (1.0 - 4.0 * curvature * z) ** 2
-    return 1.0
-
-
-@_compiled
-def series_length(tension: float, p: Array) -> float:
-    """Length of the series spring at a force, power strokes; straight on below zero force."""
-    if p[_SERIES] == _RIGID:
-        return 0.0
-    if p[_SERIES] == _EXPONENTIAL:
-        if tension < 0.0:
-            return tension / (p[_KSE] * p[_KSE0])
-        return np.log(1.0 + tension / p[_KSE0]) / p[_KSE]
-    if tension < 0.0:
-        return p[_SL] * tension / p[_SF]
-    return 0.5 * p[_SL] * (np.sqrt(1.0 + 4.0 * tension / p[_SF]) - 1.0)
-
-
-@_compiled
-def _series_slope(tension: float, p: Array) -> float:
-    taut = max(tension, 0.0)
-    if p[_SERIES] == _RIGID:
-        return 0.0
-    if p[_SERIES] == _EXPONENTIAL:
-        return 1.0 / (p[_KSE] * (taut + p[_KSE0]))
-    return p[_SL] / p[_SF] / np.sqrt(1.0 + 4.0 * taut / p[_SF])
-
-
-@_compiled
-def _thin(n_on: float, q0: float, calcium: float, switch_off: float, h: float, p: Array) -> float:
-    """Active sites after h, with bound heads held."""
-    if p[_THIN] == _SIGMOID:
-        felt = calcium * 10.0 ** (p[_AFFINITY] * (q0 - _USUAL_Q0))
-        target = 1.0 / (1.0 + (p[_KAPPA] / felt) ** p[_N])
-        target /= 1.0 + (switch_off - 1.0) * (1.0 - target)
-        # Neighbours that hold each other are slow where about half of them are on.
-        lag = p[_TAU_ACT] * (1.0 + 60.0 * p[_AFFINITY] * n_on * (1.0 - n_on))
-        return target + (n_on - target) * np.exp(-h / lag)
-    on, off, koop = p[_KON] * calcium, p[_KOFF] * switch_off, p[_KOOP]
-    # n' = a + b n + c n²
-    a = on + off * q0 * (1.0 + koop)
-    b = on * (koop - 1.0) - off * (1.0 + koop) - off * q0 * koop
-    c = koop * (off - on)
-    root = np.sqrt(max(b * b - 4.0 * a * c, 0.0))
-    half = 0.5 * root * h
-    t = h * 0.5 if half < 1e-9 else np.tanh(half) / root
-    rate = a + b * n_on + c * n_on * n_on
-    return n_on + 2.0 * rate * t / (1.0 - (b + 2.0 * c * n_on) * t)
-
-
-@_compiled
-def _thick(drx: float, q0: float, torn: float, force: float, recruitment: float, h: float, p: Array) -> float:
-    """Heads ready to attach after h, with bound heads held."""
-    if p[_THICK] != _REGULATED:
-        return 1.0 - q0 - torn
-    pull = max(force, 0.0)
-    if p[_JS] > 0.0:
-        pull /= 1.0 + pull / p[_JS]
-    up = p[_J1] * (1.0 + p[_JF] * pull + recruitment)
-    total = up + p[_J2]
-    target = up * (1.0 - q0 - torn) / total
-    return target + (drx - target) * np.exp(-total * h)
-
-
-@_compiled
-def _attachment(length: float, p: Array) -> float:
-    """Factor of the attachment rate by the distance of the filaments, which falls as the half-sarcomere is stretched."""
-    if p[_LS] == 0.0:
-        return 1.0
-    best = p[_LB]
-    distance = 1.0 / np.sqrt(max(1.0 + length / p[_GAMMA], 0.1))
-    # LATTICE_SLOPE is the factor's relative slope at rest.
-    return np.exp(((1.0 - best) ** 2 - (distance - best) ** 2) * p[_LS] / (1.0 - best))
-
-
-@_compiled
-def _overlap(length: float, p: Array) -> float:
-    """Share of sites within reach of heads: all up to an edge, then falling in a straight line."""
-    return max(0.0, 1.0 - p[_OS] * max(0.0, length / p[_GAMMA] - p[_OE]))
-
-
-@_compiled
+@compiled
 def _heads(
-    n: Array, unit: Array, move: float, attachment: float, h: float, x0: float, dx: float, p: Array, work: Array
+    n: Array, unit: Array, move: float, factor: float, h: float, x0: float, dx: float, p: Array, work: Array
 ) -> None:
     """Attachment and detachment over h at strains half-way through the step; updates heads, ready and torn heads."""
     bins = n.size
     shift = unit[OFFSET] + move
     slow, fast = p[_K11] * np.exp(-p[_K12] * shift), p[_K21] * np.exp(p[_K22] * shift)
     length = unit[LENGTH] + move
-    f = p[_F] * attachment * _attachment(length, p)
-    sites = unit[N_ON] * _overlap(length, p)
+    f = p[_F] * factor * attachment(length, p)
+    sites = unit[N_ON] * overlap(length, p)
     tears, q0 = p[_TK] > 0.0, unit[Q0]
     source = f * max(0.0, unit[DRX] * (sites - q0))
     rebound_rate = 0.0
@@ -223,7 +119,7 @@ def _heads(
         unit[DRX] = 1.0 - new_q0 - unit[TORN]
 
 
-@_compiled
+@compiled
 def _weak(unit: Array, h: float, p: Array) -> None:
     """Weakly bound heads: as many as sites are active, let go the faster the more they are strained."""
     unit[WEAK_SITES] = unit[N_ON] + (unit[WEAK_SITES] - unit[N_ON]) * np.exp(-h / p[_WL])
@@ -232,7 +128,7 @@ def _weak(unit: Array, h: float, p: Array) -> None:
     unit[WEAK_FORCE] *= np.exp(-rate * h)
 
 
-@_compiled
+@compiled
 def _linear(n: Array, unit: Array, move: float, x0: float, dx: float, p: Array) -> tuple[float, float]:
     """Force and stiffness of a half-sarcomere's heads when all have moved by `move`."""
     force, stiffness = 0.0, 0.0
@@ -243,12 +139,12 @@ def _linear(n: Array, unit: Array, move: float, x0: float, dx: float, p: Array) 
         return force, unit[Q0]
     for i in range(n.size):
         z = 1.0 + x0 + i * dx + unit[OFFSET] + move
-        force += n[i] * _head_force(z, p[_CURVE])
-        stiffness += n[i] * _head_stiffness(z, p[_CURVE])
+        force += n[i] * head_force(z, p[_CURVE])
+        stiffness += n[i] * head_stiffness(z, p[_CURVE])
     return dx * force, dx * stiffness
 
 
-@_compiled
+@compiled
 def _balance(
     n: Array, units: Array, strength: Array, shared: Array, length: float, x0: float, dx: float, p: Array, line: Array
 ) -> None:
@@ -262,7 +158,7 @@ def _balance(
     moved = np.zeros(count)
     tension = shared[TENSION]
     free = length - shared[CREPT]
-    for sweep in range(30):
+    for _ in range(30):
         mean = 0.0
         compliance = 0.0
         for m in range(count):
@@ -280,7 +176,7 @@ def _balance(
         # mean + compliance T + series_length(T) = free: rising and concave, so Newton's steps cannot run away.
         for _ in range(60):
             error = mean + compliance * tension + series_length(tension, p) - free
-            step = error / (compliance + _series_slope(tension, p))
+            step = error / (compliance + series_slope(tension, p))
             tension -= step
             if abs(step) < 1e-13 + 1e-12 * abs(tension):
                 break
@@ -302,7 +198,7 @@ def _balance(
         _renumber(n[m], unit, dx)
 
 
-@_compiled
+@compiled
 def _renumber(n: Array, unit: Array, dx: float) -> None:
     """Bring the offset back within half a bin; heads that leave the grid are lost, far beyond where any stays."""
     k = int(np.floor(unit[OFFSET] / dx + 0.5))
@@ -322,7 +218,7 @@ def _renumber(n: Array, unit: Array, dx: float) -> None:
     unit[Q0] = total * dx
 
 
-@_compiled
+@compiled
 def _expected(units: Array, strength: Array, change: float, shared: Array, p: Array) -> None:
     """Half-sarcomeres' movement expected in this step: the last one, and their share of what the length does anew."""
     extra = change - shared[LAST_CHANGE]
@@ -336,10 +232,10 @@ def _expected(units: Array, strength: Array, change: float, shared: Array, p: Ar
         compliance += 1.0 / max(slope, 1e-12) / count
     for m in range(count):
         slope = strength[m] * units[m, Q0] + p[_WK] * units[m, WEAK_SITES] + p[_UK]
-        units[m, LAST_MOVE] += extra / max(slope, 1e-12) / (compliance + _series_slope(shared[TENSION], p))
+        units[m, LAST_MOVE] += extra / max(slope, 1e-12) / (compliance + series_slope(shared[TENSION], p))
 
 
-@_compiled
+@compiled
 def advance(
     n: Array,
     units: Array,
@@ -381,8 +277,8 @@ def advance(
         calcium, switch_off, recruitment = acting[k, CALCIUM], acting[k, SWITCH_OFF], acting[k, RECRUITMENT]
         for m in range(count):
             unit = units[m]
-            unit[N_ON] = _thin(unit[N_ON], unit[Q0], calcium, switch_off, 0.5 * h, p)
-            unit[DRX] = _thick(unit[DRX], unit[Q0], unit[TORN], unit[FORCE], recruitment, 0.5 * h, p)
+            unit[N_ON] = thin(unit[N_ON], unit[Q0], calcium, switch_off, 0.5 * h, p)
+            unit[DRX] = thick(unit[DRX], unit[Q0], unit[TORN], unit[FORCE], recruitment, 0.5 * h, p)
             _heads(n[m], unit, 0.5 * unit[LAST_MOVE], acting[k, ATTACHMENT], h, x0, dx, p, work)
             if p[_WK] > 0.0:
                 _weak(unit, h, p)
@@ -392,8 +288,8 @@ def advance(
         _balance(n, units, strength, shared, p[_GAMMA] * length[k + 1], x0, dx, p, line)
         for m in range(count):
             unit = units[m]
-            unit[DRX] = _thick(unit[DRX], unit[Q0], unit[TORN], unit[FORCE], recruitment, 0.5 * h, p)
-            unit[N_ON] = _thin(unit[N_ON], unit[Q0], calcium, switch_off, 0.5 * h, p)
+            unit[DRX] = thick(unit[DRX], unit[Q0], unit[TORN], unit[FORCE], recruitment, 0.5 * h, p)
+            unit[N_ON] = thin(unit[N_ON], unit[Q0], calcium, switch_off, 0.5 * h, p)
         if (k + 1) % every == 0:
             row = (k + 1) // every - 1
             out[row, 0] = shared[TENSION]
@@ -401,9 +297,9 @@ def advance(
             out[row, 2] = np.mean(units[:, Q0])
 
 
-@_compiled
+@compiled
 def level(calcium: float, x0: float, dx: float, bins: int, p: Array, unit: Array, n: Array) -> None:
-    """Isometric equilibrium of a half-sarcomere at rest length, reached from below as a fibre is activated from rest."""
+    """Isometric equilibrium of a half-sarcomere at rest length, reached from below as in activation from rest."""
     weight = np.empty(bins)
     norm = 1.0 / (p[_W] * np.sqrt(2.0 * np.pi))
     bound, pull = 0.0, 0.0
@@ -421,10 +317,10 @@ def level(calcium: float, x0: float, dx: float, bins: int, p: Array, unit: Array
         drx = p[_J1] / (p[_J1] + p[_J2])
     for _ in range(20000):
         last = n_on + q0 + drx
-        n_on = _thin(n_on, q0, calcium, 1.0, 1e-3, p)
+        n_on = thin(n_on, q0, calcium, 1.0, 1e-3, p)
         q0_level = drx * n_on * bound / (1.0 + drx * bound)
         q0 += 0.3 * (q0_level - q0)
-        drx = _thick(drx, q0, 0.0, q0 / bound * pull, 0.0, 1e-3, p)
+        drx = thick(drx, q0, 0.0, q0 / bound * pull, 0.0, 1e-3, p)
         if abs(n_on + q0 + drx - last) < 1e-12:
             break
     for i in range(bins):

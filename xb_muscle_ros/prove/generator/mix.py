@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, MECHANISMS, Name
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.prove.generator.effects import EFFECTS, OUTSIDE
 
 SHARES = {"null": 0.2, "fault": 0.2, "single": 0.4, "pair": 0.1, "outside": 0.1}
@@ -46,6 +47,18 @@ def specs(cases: int, seed: int) -> list[Spec]:
     sizes = _turns(random, SIZES, counts["pair"])
     for size in sizes:
         made.append(_pair(random, size))
+    return [made[i] for i in random.permutation(len(made))]
+
+
+def spike_specs(cases: int, seed: int, model: str) -> list[Spec]:
+    """Cases for recordings of one fibre: one in five as recorded, else a mechanism that the model can have."""
+    random = np.random.default_rng([seed, 0])
+    bare = round(0.2 * cases)
+    possible = [name.value for name in MECHANISMS if model in EFFECTS[name.value].models]
+    if not possible:
+        raise UserError(f"model {model} can have no effect of the generator; allowed are {', '.join(_MODELS)}")
+    made = [Spec("null", (), None, model) for _ in range(bare)]
+    made += [Spec("single", (label,), size, model) for label, size in _sized(random, possible, cases - bare)]
     return [made[i] for i in random.permutation(len(made))]
 
 

@@ -21,22 +21,22 @@ _SHIFT, _GAIN = 0.01, 0.01
 _WORTH, _WORTH_SD = 10.0, 0.003
 
 
-def left_beside_nuisances(base: World, study: Sequence[Planned], refit: Refit, refitted: Refitted) -> float:
-    """RMS, F0, of what is left when constants and usual faults together are fitted once more, linearly.
+def left_beside_nuisances(base: World, study: Sequence[Planned], refit: Refit, refitted: Refitted) -> list[Array]:
+    """What is left, F0, by trial, when constants and usual faults together are fitted once more, linearly.
 
     Faults have their usual SDs as priors: pCa of each solution, length gain, run-down, offset and drift of each
     trial, delay (a transducer's lag is the same to first order).
     """
     left = np.concatenate(refitted.left)
     if not np.any(left):
-        return 0.0
+        return list(refitted.left)
     faults = _columns(base, study, refit.plain())
     jacobian = np.column_stack([refit.jacobian, *faults])
     weight = np.sqrt(_WORTH * len(study) / left.size) / _WORTH_SD
     a = np.vstack([weight * jacobian, np.eye(jacobian.shape[1])])
     b = np.concatenate([weight * left, np.zeros(jacobian.shape[1])])
     solution: Array = np.linalg.lstsq(a, b, rcond=None)[0]
-    return float(np.sqrt(np.mean((left - jacobian @ solution) ** 2)))
+    return refit.split(left - jacobian @ solution)
 
 
 def _columns(base: World, study: Sequence[Planned], plain: list[Array]) -> list[Array]:

@@ -64,7 +64,7 @@ class Refit:
 
     def plain(self) -> list[Array]:
         """Forces of the base at the true constants."""
-        return self._split(self._plain)
+        return self.split(self._plain)
 
     def left_at_once(self, forces: Sequence[Array]) -> float:
         """RMS left of data by a linear fit, F0."""
@@ -83,7 +83,7 @@ class Refit:
         if thorough:
             at, model = self._descend(data, at, model, self._jacobian_at(at, model))
         left = data - model
-        return Refitted(float(np.sqrt(np.mean(left**2))), self._split(left), self._values(at))
+        return Refitted(float(np.sqrt(np.mean(left**2))), self.split(left), self._values(at))
 
     def _descend(self, data: Array, at: Array, model: Array, jacobian: Array) -> tuple[Array, Array]:
         """Gauss–Newton steps with a Jacobian that learns from each of them (Broyden), shortened where need be."""
@@ -136,5 +136,6 @@ class Refit:
     def _forces(self, at: Array) -> list[Array]:
         return study_forces(Truth(self._base.with_values(self._values(at))), self._study, _COARSE)
 
-    def _split(self, joined: Array) -> list[Array]:
+    def split(self, joined: Array) -> list[Array]:
+        """Samples of all trials by trial."""
         return np.split(joined, np.cumsum([s.length.size for s in self._study])[:-1])

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 
 from xb_muscle_ros.prove.generator import kernel
 from xb_muscle_ros.prove.generator.layout import At, Series, Thick, Thin
+from xb_muscle_ros.prove.generator.pieces import series_length
 
 Array = npt.NDArray[np.float64]
 
@@ -195,13 +196,11 @@ def _settled(world: World, stimulus: Stimulus, row: Array, mesh: Mesh, p: Array)
     if stiffness > 0.0:
         # All half-sarcomeres stand still where what they differ by in strength is borne by their passive springs.
         tension = float(
-            brentq(
-                lambda t: (t - force) / stiffness + kernel.series_length(t, p) - GAMMA * stimulus.length[0], -1e3, 1e3
-            )
+            brentq(lambda t: (t - force) / stiffness + series_length(t, p) - GAMMA * stimulus.length[0], -1e3, 1e3)
         )
         state.units[:, kernel.LENGTH] = (tension - strength * state.units[:, kernel.FORCE]) / stiffness
     else:
-        state.units[:, kernel.LENGTH] = GAMMA * stimulus.length[0] - kernel.series_length(tension, p)
+        state.units[:, kernel.LENGTH] = GAMMA * stimulus.length[0] - series_length(tension, p)
     state.shared[kernel.TENSION] = tension
     if p[At.CREEP] > 0.0:
         state.shared[kernel.CREPT] = p[At.CREEP] * tension

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,6 @@ from xb_muscle_ros.prove.generator.recording import Faults
 from xb_muscle_ros.prove.generator.world import SAMPLE_S
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.trial import Trial, TrialFacts
-from xb_muscle_ros.work import JsonValue
 
 
 def write_case(folder: Path, case: Case, fibre: str, method: str) -> None:
@@ -37,7 +37,7 @@ def write_case(folder: Path, case: Case, fibre: str, method: str) -> None:
     write_text(folder / "fibre.yaml", fibre_text(fibre, case.spec.model, method, case.nominal))
 
 
-def key_entry(case: Case, name: str) -> dict[str, JsonValue]:
+def key_entry(case: Case, name: str) -> dict[str, Any]:
     """Everything that is true of a case, as JSON can hold it."""
     spec = case.spec
     achieved = case.refitted.rms
@@ -51,7 +51,7 @@ def key_entry(case: Case, name: str) -> dict[str, JsonValue]:
         "size_f0": achieved,
         "size_class_f0": size_class(achieved) if spec.kind in ("single", "pair", "outside") else None,
         "before_refit_f0": case.before,
-        "beside_nuisances_f0": case.beside_nuisances,
+        "beside_nuisances_f0": float(np.sqrt(np.mean(np.concatenate(case.beside_nuisances) ** 2))),
         "concealed": [{"label": c.label, "scale": c.scale, "shape": c.shape} for c in case.concealed],
         "faults": _of_faults(case.faults),
         "values": case.values,
@@ -62,11 +62,11 @@ def key_entry(case: Case, name: str) -> dict[str, JsonValue]:
             / sum(force.size for force in case.recorded)
         ),
         "pca": {trial_name(i): planned.pca for i, planned in enumerate(case.study)},
-        "cells": cells(case),
+        "cells": cells(case.study, case.refitted.left, case.beside_nuisances),
     }
 
 
-def _of_faults(faults: Faults) -> dict[str, JsonValue]:
+def _of_faults(faults: Faults) -> dict[str, Any]:
     return {
         "pca_shift": {f"{pca:g}": shift for pca, shift in faults.pca_shift.items()},
         "length_gain": faults.length_gain,

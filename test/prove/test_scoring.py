@@ -1,0 +1,167 @@
+"""Scores: hand-made results whose scores are known, and a key that must be the sealed one."""
+
+from __future__ import annotations
+
+import json
+import sys
+import types
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from xb_muscle_ros.cli.main import main
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.prove.counting import interval, scores
+from xb_muscle_ros.prove.judging import judge
+from xb_muscle_ros.prove.make import seal
+from xb_muscle_ros.prove.run import RESULTS, run
+from xb_muscle_ros.prove.score import score
+from xb_muscle_ros.work import Options
+
+CELLS = [
+    {"trial": "trial_01", "phase": "hold", "rms_f0": 0.010, "beside_nuisances_f0": 0.002},
+    {"trial": "trial_01", "phase": "recovery", "rms_f0": 0.006, "beside_nuisances_f0": 0.004},
+    {"trial": "trial_02", "phase": "hold", "rms_f0": 0.004, "beside_nuisances_f0": 0.001},
+]
+
+
+def truth(case: str, kind: str, *labels: str, size: float | None = None) -> dict[str, Any]:
+    """A case of a key."""
+    cells = CELLS if size else [{**cell, "rms_f0": 0.0, "beside_nuisances_f0": 0.0} for cell in CELLS]
+    return {
+        "case": case, "kind": kind, "labels": list(labels), "size_f0": size or 0.0, "size_class_f0": size,
+        "noise_rms_f0": 0.001, "cells": cells,
+    }  # fmt: skip
+
+
+def said(verdict: str, *answer: str, where: tuple[str, str] | None = None, **more: Any) -> dict[str, Any]:
+    """What a tool says of a case."""
+    first = None if where is None else {"trial": where[0], "phase": where[1], "size_f0": 0.01}
+    return {"verdict": verdict, "answer": list(answer), "first_mismatch": first, "confidence": 0.8, **more}
+
+
+KEY = [
+    truth("case_0001", "null"),
+    truth("case_0002", "null"),
+    truth("case_0003", "fault", "force_drift"),
+    truth("case_0004", "fault", "time_shift"),
+    truth("case_0005", "single", "viscous_drag", size=0.02),
+    truth("case_0006", "single", "lattice_spacing", size=0.04),
+    truth("case_0007", "single", "active_titin", size=0.005),
+    truth("case_0008", "pair", "forcible_detachment", "active_titin", size=0.02),
+    truth("case_0009", "outside", "outside:series_creep", size=0.01),
+    truth("case_0010", "single", "temperature", size=0.0),
+]
+SAID = {
+    "case_0001": said("none"),
+    "case_0002": said("ambiguous", "viscous_drag", "force_offset"),
+    "case_0003": said("measurement", "force_offset"),
+    "case_0004": said("physics", "viscous_drag"),
+    "case_0005": said(
+        "physics", "viscous_drag", where=("trial_01", "hold"), before_heldout_f0=0.021, after_heldout_f0=0.003
+    ),
+    "case_0006": said("ambiguous", "filament_overlap", where=("trial_01", "recovery")),
+    "case_0007": said("unexplained", where=("trial_02", "hold")),
+    "case_0008": said("physics", "active_titin", where=("trial_01", "hold")),
+    "case_0009": said("unexplained"),
+    "case_0010": said("parameters"),
+}
+
+
+def test_scores_of_known_results() -> None:
+    judged = [judge(case, SAID[case["case"]]) for case in KEY]
+    found = {s.name: s for s in scores(judged)}
+    expected = {
+        "null_physics": (0.5, 2), "fault_physics": (0.5, 2), "large_family": (1.0, 2), "large_exact": (0.5, 2),
+        "precision_family": (2 / 3, 3), "precision_exact": (2 / 3, 3), "outside_abstains": (1.0, 1),
+        "located": (0.75, 4), "located_beside_nuisances": (0.75, 4), "gain": (0.9, 1), "coverage": (0.4, 5),
+        "fault_exact": (0.0, 2), "fault_family": (0.5, 2), "null_quiet": (0.5, 2), "pair_first": (1.0, 1),
+        "mismatch_found": (2 / 3, 6), "failed": (0.0, 10),
+    }  # fmt: skip
+    for name, (value, n) in expected.items():
+        assert (found[name].value, found[name].n) == (pytest.approx(value), n), name
+    assert found["null_physics"].reached is False
+    assert found["large_family"].reached is True
+    assert judged[-1].exact
+
+
+def test_failure_of_the_tool_is_no_right_answer() -> None:
+    judged = judge(KEY[4], {"error": "no such bag"})
+    assert (judged.verdict, judged.exact, judged.family, judged.located) == ("error", False, False, None)
+
+
+def test_interval_is_exact() -> None:
+    # Published values of the Clopper–Pearson interval.
+    assert interval(0, 10) == (0.0, pytest.approx(0.3085, abs=1e-4))
+    assert interval(5, 10) == (pytest.approx(0.1871, abs=1e-4), pytest.approx(0.8129, abs=1e-4))
+
+
+@pytest.fixture
+def benchmark_folder(tmp_path: Path) -> Path:
+    """A sealed benchmark whose cases are empty files."""
+    seal(tmp_path / "b", tmp_path / "key.json", 3, KEY, "about", "gaussian")
+    for case in SAID:
+        (tmp_path / "b" / "cases" / case / "bags").mkdir(parents=True)
+        (tmp_path / "b" / "cases" / case / "fibre.yaml").write_text(case)
+    return tmp_path
+
+
+def _tool(monkeypatch: pytest.MonkeyPatch, seen: list[str]) -> None:
+    """A stand-in for the tool that knows the answers of `SAID`."""
+
+    def diagnose_bags(bags: Any, fiber: Path, out: Path, quick: bool = False, seed: int = 1) -> dict[str, Any]:
+        name = fiber.parent.name
+        seen.append(name)
+        if name == "case_0010":
+            raise UserError("no force")
+        found = SAID[name]
+        first = found["first_mismatch"]
+        held = {when: {"heldout_rmsd_f0": found.get(f"{when}_heldout_f0")} for when in ("before", "after")}
+        return {**found, **held, "mismatch": [] if first is None else [{**first, "p_value": 0.01}]}
+
+    module = types.ModuleType("xb_muscle_ros.diagnose.run")
+    module.diagnose_bags = diagnose_bags  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "xb_muscle_ros.diagnose.run", module)
+    monkeypatch.setattr("xb_muscle_ros.trials.bags.find_bags", lambda paths: list(paths))
+
+
+def test_run_then_score(benchmark_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[str] = []
+    _tool(monkeypatch, seen)
+    out = benchmark_folder / "r"
+    done = run(benchmark_folder / "b", out, True, 1, Options(processes=0, quiet=True))
+    assert done["cases"]["case_0010"]["error"] == "no force"
+    again = run(benchmark_folder / "b", out, True, 1, Options(processes=0, quiet=True))
+    assert seen == sorted(SAID)
+    assert again == done
+    text, files = score(out, benchmark_folder / "key.json", benchmark_folder / "s")
+    assert "| false alarm on nulls | 50 % | 1 % to 99 % | 2 | ≤ 5 % | no |" in text
+    assert all(path.stat().st_size for path in files)
+    tree = json.loads((benchmark_folder / "s" / "scores.json").read_text())
+    assert tree["scores"]["gain"]["value"] == pytest.approx(0.9)
+    assert tree["scores"]["failed"]["value"] == pytest.approx(0.1)
+
+
+def test_another_key_is_refused(benchmark_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = benchmark_folder / "r"
+    out.mkdir()
+    (out / RESULTS).write_text(json.dumps({"cases": SAID}))
+    (out / "benchmark.json").write_text((benchmark_folder / "b" / "benchmark.json").read_text())
+    key = benchmark_folder / "key.json"
+    arguments = ["prove", "score", str(out), "--key", str(key), "--out", str(benchmark_folder / "s")]
+    assert main(arguments) == 0
+    content = json.loads(key.read_text())
+    content["cases"][0]["kind"] = "single"
+    key.write_text(json.dumps(content))
+    assert main(arguments) == 2
+    assert "sealed with" in capsys.readouterr().err
+
+
+def test_unfinished_results_are_refused(benchmark_folder: Path) -> None:
+    out = benchmark_folder / "r"
+    out.mkdir()
+    (out / RESULTS).write_text(json.dumps({"cases": {"case_0001": SAID["case_0001"]}}))
+    (out / "benchmark.json").write_text((benchmark_folder / "b" / "benchmark.json").read_text())
+    with pytest.raises(UserError, match="lacks 9 of 10 cases, case_0002 first"):
+        score(out, benchmark_folder / "key.json", benchmark_folder / "s")
