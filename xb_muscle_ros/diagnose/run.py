@@ -111,7 +111,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
     scores = held_out(study, scored, folds, max(6, effort.most // 2), options) if folds else {}
     flexible = recordings.flexible_rmsd_f0(study, search.linear, folds) if folds and detected else None
     lead = _lead(search)
-    interval = known(study, search.final, lead, effort.closure > 1, options) if lead and detected else None
+    interval = known(study, search.final, lead, effort.profiled, options) if lead and detected else None
     decision = decide(
         Evidence(
             search=search,

@@ -39,6 +39,7 @@ class Effort:
         rivals: of the answer whose held-out scores are computed.
         draws: of the bootstrap.
         closure: rounds of taking out the Gaussian form's own error.
+        profiled: whether the profile of the answer's parameter is followed.
     """
 
     steps: int = 3
@@ -49,9 +50,10 @@ class Effort:
     rivals: int = 4
     draws: int = 500
     closure: int = 2
+    profiled: bool = True
 
 
-QUICK = Effort(steps=2, candidates=6, later=3, most=12, folds=3, rivals=2, draws=400, closure=2)
+QUICK = Effort(steps=2, candidates=6, later=3, most=12, folds=3, rivals=2, draws=400, profiled=False)
 
 
 @dataclass
@@ -167,7 +169,7 @@ class Searcher:
 
     def _step(self, final: Fit, candidates: Sequence[Screened], step: int) -> Fit | None:
         """The best fit with one more explanation, or None where none is worth it."""
-        chosen = _promising(candidates, final.cost, self.effort.later if step else self.effort.candidates)
+        chosen = _promising(candidates, final.cost, self.effort.later if step else self.effort.candidates, step == 0)
         wanted = [(final.explanation.plus(s.name), s.starts) for s in chosen]
         fits = self.fitted(wanted, f"step {step + 1}")
         best = min(fits, key=penalised, default=None)
@@ -193,14 +195,15 @@ class Searcher:
             if rest is None:
                 continue
             linear = Linear.of(self.study, rest)
-            chosen = _promising(screen(self.study, rest, linear), rest.cost, self.effort.rivals)
+            chosen = _promising(screen(self.study, rest, linear), rest.cost, self.effort.rivals, False)
             self.fitted([(rest.explanation.plus(s.name), s.starts) for s in chosen], "rivals")
 
 
-def _promising(candidates: Sequence[Screened], cost: float, most: int) -> list[Screened]:
+def _promising(candidates: Sequence[Screened], cost: float, most: int, all_blind: bool) -> list[Screened]:
     """Candidates worth a fit: those that only a fit can tell, and the most promising of the others."""
-    blind = [s for s in candidates if np.isnan(s.gain) or s.name in _NO_LINE]
-    told = [s for s in candidates if not np.isnan(s.gain) and s.name not in _NO_LINE]
+    no_line = _NO_LINE if all_blind else ()
+    blind = [s for s in candidates if np.isnan(s.gain) or s.name in no_line]
+    told = [s for s in candidates if not np.isnan(s.gain) and s.name not in no_line]
     best = max((s.gain for s in told), default=0.0)
     return [*blind, *(s for s in told if s.gain >= max(_PROMISE * best, _LEAST_GAIN, 0.01 * cost))][: most + len(blind)]
 
