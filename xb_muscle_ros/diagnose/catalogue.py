@@ -133,7 +133,7 @@ _ROWS = (
         "hs_spread",
         0.1,
         {"hs_stiffness": 1.0},
-        tuple({"hs_spread": 0.1, "hs_stiffness": k} for k in (0.003, 0.03)),
+        tuple({"hs_spread": s, "hs_stiffness": k} for s, k in ((0.03, 0.0005), (0.08, 0.003), (0.1, 0.03))),
         reach=6.0,
     ),
     Entry(

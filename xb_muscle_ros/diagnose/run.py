@@ -196,15 +196,15 @@ def _proposal(search: Search, decision: Decision, trials: Sequence[Trial]) -> Pr
     return propose(search.study, first, second, chosen)
 
 
-# More noise than this hides what is looked for, F0; a base that leaves more than this share of the force's standard
-# deviation does not describe the recordings.
+# More noise than this hides what is looked for, F0; an explanation that leaves more than this share of the force's
+# standard deviation does not describe the recordings.
 _NOISY_F0, _UNDESCRIBED = 0.02, 0.5
 
 
 def _described(recordings: Recordings, search: Search, measured: Sequence[Any]) -> bool:
     """Whether there is anything to build on."""
     spread = float(np.std(np.concatenate(list(measured))))
-    return recordings.noise_rms_f0(search.study) <= _NOISY_F0 and search.base.rmsd_f0 <= _UNDESCRIBED * spread
+    return recordings.noise_rms_f0(search.study) <= _NOISY_F0 and search.final.rmsd_f0 <= _UNDESCRIBED * spread
 
 
 def _missing(
@@ -218,7 +218,7 @@ def _missing(
     if noise > _NOISY_F0:
         lines.append(f"force with less noise: {100 * noise:.1f} % F0 hides what is looked for")
     spread = float(np.std(np.concatenate(list(measured))))
-    if search.base.rmsd_f0 > _UNDESCRIBED * spread:
+    if search.final.rmsd_f0 > _UNDESCRIBED * spread:
         lines.append(
             "recordings that the model describes at all: after the fit half of the force's variation is left; check "
             "that channels, units, calcium and fibre belong together"
