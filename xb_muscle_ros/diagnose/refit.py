@@ -114,7 +114,15 @@ def _best_start(
 
 
 def heldout_mse(study: Study, explanation: Explanation, values: Mapping[str, float], trial: FitTrial) -> float:
-    """Mean square difference in a trial that the fit did not see, F0².
+    """Mean square difference in a trial that the fit did not see, F0²; 1 where the model has no solution."""
+    predicted = heldout_force(study, explanation, values, trial)
+    return 1.0 if predicted is None else float(np.mean((predicted - trial.measured_f0) ** 2))
+
+
+def heldout_force(
+    study: Study, explanation: Explanation, values: Mapping[str, float], trial: FitTrial
+) -> Array | None:
+    """Recorded force of a trial that the fit did not see, F0; None where the model has no solution.
 
     Faults that are the trial's or its solution's own are estimated from its force before anything moves, and from
     nothing else; without that the predictions of all explanations would differ by their solutions, not by stretches.
@@ -138,10 +146,9 @@ def heldout_mse(study: Study, explanation: Explanation, values: Mapping[str, flo
             calm = replace(problem, trials=(quiet,), coordinates=free, correction=study.correction(len(free)))
             found = descend(Objective(Training(calm), SCALE), np.zeros(len(free)), most=10, tolerance=1e-3)
             z[len(fixed) :] = found.z
-        predicted = problem.predicted(z)[0]
+        return problem.predicted(z)[0]
     except UserError:
-        return 1.0
-    return float(np.mean((predicted - trial.measured_f0) ** 2))
+        return None
 
 
 def residuals(study: Study, fit: Fit) -> dict[str, Array]:
