@@ -22,7 +22,7 @@ from recorded_figures import write_figure
 
 from xb_muscle_ros.diagnose.closure import closure_error
 from xb_muscle_ros.diagnose.outcome import Outcome, as_json, write
-from xb_muscle_ros.diagnose.refit import Fit, heldout_force
+from xb_muscle_ros.diagnose.refit import heldout_force
 from xb_muscle_ros.diagnose.run import diagnose
 from xb_muscle_ros.diagnose.search import QUICK, Effort, penalised
 from xb_muscle_ros.diagnose.study import Study
@@ -35,8 +35,8 @@ from xb_muscle_ros.fit.run import Settings, fit
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.trials.bags import find_bags, read_trial
 from xb_muscle_ros.trials.importing import Failed, import_recordings
-from xb_muscle_ros.trials.readers.settings import ImportSettings
 from xb_muscle_ros.trials.readers.mapping import load_mapping
+from xb_muscle_ros.trials.readers.settings import ImportSettings
 from xb_muscle_ros.trials.trial import Trial
 from xb_muscle_ros.work import Options
 
@@ -90,7 +90,14 @@ def run_case(case: Case, recordings: Sequence[Path], folder: Path, quick: bool) 
     rows, arrays = predictions(outcome, concealed)
     with replaced(folder / "predictions.npz") as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
-    found = {"case": case.key, "shown": [t.facts.trial for t in shown], "concealed": rows}
+    found = {
+        "case": case.key,
+        "shown": [t.facts.trial for t in shown],
+        "answer": outcome.shown.explanation.label,
+        "best_found": outcome.search.final.explanation.label,
+        "start": dict(base.values),
+        "concealed": rows,
+    }
     write_text(folder / "predictions.json", json.dumps(found, indent=1) + "\n")
 
 
@@ -122,7 +129,7 @@ def predictions(outcome: Outcome, concealed: dict[str, list[Trial]]) -> tuple[li
     """
     search = outcome.search
     ordered = sorted(search.fits.values(), key=penalised)
-    fits = {f.explanation.label: f for f in [search.base, search.final, *ordered[:_RIVALS]]}
+    fits = {f.explanation.label: f for f in [search.base, outcome.shown, search.final, *ordered[:_RIVALS]]}
     every = [t for group in concealed.values() for t in group]
     unseen = fit_trials(every, [False] * len(every), whole=True)
     study = Study(outcome.study.fibre, unseen)
@@ -133,15 +140,14 @@ def predictions(outcome: Outcome, concealed: dict[str, list[Trial]]) -> tuple[li
     for k, (group, trial) in enumerate(zip(groups, unseen, strict=True)):
         forces = {label: heldout_force(study, f.explanation, f.values, trial) for label, f in fits.items()}
         arrays |= {f"p{k}_time_s": trial.force_time_s, f"p{k}_measured_f0": trial.measured_f0}
-        for key, f in (("before", search.base), ("after", search.final)):
+        for key, f in (("before", search.base), ("after", outcome.shown)):
             force = forces[f.explanation.label]
             arrays[f"p{k}_{key}_f0"] = np.full(trial.measured_f0.size, np.nan) if force is None else force
         scores = {
             label: None if force is None else float(np.sqrt(np.mean((force - trial.measured_f0) ** 2)))
             for label, force in forces.items()
         }
-        row = {"trial": trial.name, "tests": group, "rmsd_f0": scores}
-        rows.append({**row, "base": search.base.explanation.label, "final": search.final.explanation.label})
+        rows.append({"trial": trial.name, "tests": group, "rmsd_f0": scores})
     return rows, arrays
 
 

@@ -93,7 +93,7 @@ def stimulated(trial: Trial) -> Trial:
 
 
 def resting_spring(trials: Sequence[Trial], before_s: float, gamma: float) -> dict[str, float]:
-    """kpe and Fpe0 of a linear parallel spring from the forces of a muscle at rest, by least squares.
+    """Kpe and Fpe0 of a linear parallel spring from the forces of a muscle at rest, by least squares.
 
     Args:
         trials: with different lengths.

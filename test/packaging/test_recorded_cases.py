@@ -64,7 +64,9 @@ def test_resting_spring_is_the_line_through_resting_forces(cases: ModuleType) ->
         trial = _trial(length_l0=stretch)
         time = trial.time_s
         trials.append(
-            Trial(trial.facts, time, trial.length_m, np.zeros(1), np.full(1, 0.1), time, np.where(time < 1.0, force, 9.0))
+            Trial(
+                trial.facts, time, trial.length_m, np.zeros(1), np.full(1, 0.1), time, np.where(time < 1.0, force, 9.0)
+            )
         )
     found = cases.resting_spring(trials, 0.9, 130.0)
     assert found["kpe"] * 130.0 == pytest.approx(0.3)

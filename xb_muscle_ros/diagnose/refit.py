@@ -119,9 +119,7 @@ def heldout_mse(study: Study, explanation: Explanation, values: Mapping[str, flo
     return 1.0 if predicted is None else float(np.mean((predicted - trial.measured_f0) ** 2))
 
 
-def heldout_force(
-    study: Study, explanation: Explanation, values: Mapping[str, float], trial: FitTrial
-) -> Array | None:
+def heldout_force(study: Study, explanation: Explanation, values: Mapping[str, float], trial: FitTrial) -> Array | None:
     """Recorded force of a trial that the fit did not see, F0; None where the model has no solution.
 
     Faults that are the trial's or its solution's own are estimated from its force before anything moves, and from
