@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -109,20 +110,17 @@ def resting_spring(trials: Sequence[Trial], before_s: float, gamma: float) -> di
 def soft_spring(length_l0: Array, force_f0: Array, gamma: float) -> dict[str, float]:
     """kpe, lpe0 and pe_sharpness of F = kpe gamma ln(1 + exp(K (ΔL - lpe0)))/K by least squares."""
 
-    def of(z: Array) -> Array:
-        stiffness, sharpness = np.exp(z[0]), np.exp(z[2])
-        force: Array = stiffness * np.logaddexp(0.0, sharpness * (length_l0 - z[1])) / sharpness
-        return force
+    def fit_from(start: Array) -> Any:
+        def left(z: Array) -> Array:
+            sharpness = np.exp(z[2])
+            force = np.exp(z[0]) * np.logaddexp(0.0, sharpness * (length_l0 - z[1])) / sharpness
+            # Next to nothing, so that what the forces do not tell stays where it was.
+            return np.append(force - force_f0, 1e-3 * (z - start))
 
-    best = min(
-        (
-            least_squares(
-                lambda z: np.append(of(z) - force_f0, 1e-3 * (z - z0)), z0, bounds=([-7, -0.5, 0.7], [5, 0.5, 6])
-            )
-            for z0 in (np.array([0.0, at, k]) for at in (0.0, 0.1) for k in (2.3, 4.0))
-        ),
-        key=lambda found: found.cost,
-    )
+        return least_squares(left, start, bounds=([-7.0, -0.5, 0.7], [5.0, 0.5, 6.0]))
+
+    starts = [np.array([0.0, at, sharpness]) for at in (0.0, 0.1) for sharpness in (2.3, 4.0)]
+    best = min((fit_from(start) for start in starts), key=lambda found: found.cost)
     return {"kpe": float(np.exp(best.x[0])) / gamma, "lpe0": float(best.x[1]), "pe_sharpness": float(np.exp(best.x[2]))}
 
 
@@ -157,7 +155,7 @@ def _gastrocnemius(trials: Sequence[Trial]) -> Fibre:
 
 
 def _trabecula(trials: Sequence[Trial]) -> Fibre:
-    """Cross-bridges off: what is left is the parallel spring, taken from what force settles at."""
+    """Cross-bridges off: what is left is the parallel spring, the one that comes nearest to all forces."""
     length = np.concatenate([t.length_change_l0 for t in trials])
     force = np.concatenate([t.measured_f0 for t in trials])
     return _as(trials, "2state_rigid_softplus", {"f": 1e-9, **soft_spring(length, force, 130.0)})

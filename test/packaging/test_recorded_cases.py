@@ -18,7 +18,8 @@ _SCRIPT = Path(__file__).parents[2] / "scripts" / "recorded_cases.py"
 @pytest.fixture(scope="module")
 def cases() -> ModuleType:
     spec = importlib.util.spec_from_file_location("recorded_cases", _SCRIPT)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
@@ -62,12 +63,9 @@ def test_resting_spring_is_the_line_through_resting_forces(cases: ModuleType) ->
     trials = []
     for stretch, force in ((0.0, 0.02), (0.1, 0.05), (0.2, 0.08)):
         trial = _trial(length_l0=stretch)
-        time = trial.time_s
-        trials.append(
-            Trial(
-                trial.facts, time, trial.length_m, np.zeros(1), np.full(1, 0.1), time, np.where(time < 1.0, force, 9.0)
-            )
-        )
+        time, none = trial.time_s, np.full(1, 0.1)
+        measured = np.where(time < 1.0, force, 9.0)
+        trials.append(Trial(trial.facts, time, trial.length_m, np.zeros(1), none, time, measured))
     found = cases.resting_spring(trials, 0.9, 130.0)
     assert found["kpe"] * 130.0 == pytest.approx(0.3)
     assert found["Fpe0"] == pytest.approx(0.02)

@@ -175,7 +175,7 @@ def isometric_window(trial: Trial) -> Window:
 
 
 def _same_calcium(trial: Trial, inside: slice) -> slice:
-    """The longest part of a window in which calcium stays as it is, without its first third where that follows a change.
+    """The longest part of a window in which calcium stays as it is; after a change of calcium, without its first third.
 
     A stimulated muscle's force comes and goes while its length is held; that is no noise.
     """
