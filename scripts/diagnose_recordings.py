@@ -3,13 +3,15 @@
 For each case (see `recorded_cases`) the recordings are imported, a base model is fitted to the trials that are shown,
 these are diagnosed, and the concealed ones are predicted by the base, by the answer and by every rival that was fitted.
 A case that is done is kept; fits of one that was interrupted are taken from its journal. Numbers go to
-<out>/<case>/predictions.json beside what `xb_muscle diagnose` writes, figures to --images.
+<out>/<case>/predictions.json beside what `xb_muscle diagnose` writes, figures to --images, all of it
+to --page.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -19,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from recorded_cases import CASES, Case, chosen
 from recorded_figures import write_figure
+from recorded_page import write_page
 
 from xb_muscle_ros.diagnose.closure import closure_error
 from xb_muscle_ros.diagnose.outcome import Outcome, as_json, write
@@ -54,6 +57,7 @@ def main() -> int:
     parser.add_argument("--recordings", type=Path, nargs="+", default=[Path("../shared/data/recordings")])
     parser.add_argument("--out", type=Path, default=Path("out/recordings"))
     parser.add_argument("--images", type=Path, default=Path("docs/images"))
+    parser.add_argument("--page", type=Path, default=Path("docs/recordings.md"))
     parser.add_argument("--quick", action="store_true", help="look less hard")
     parser.add_argument("--again", action="store_true", help="also cases that are done")
     given = parser.parse_args()
@@ -65,8 +69,12 @@ def main() -> int:
         except UserError as error:
             print(f"{case.key}: {error}", file=sys.stderr)
             continue
-        print(table(json.loads((folder / "predictions.json").read_text(encoding="utf-8"))))
         print(write_figure(folder, given.images / f"recorded_{case.key}.png"))
+    done = [
+        (c.key, c.about, given.out / c.key) for c in CASES.values() if (given.out / c.key / "predictions.json").exists()
+    ]
+    write_text(given.page, write_page(done, os.path.relpath(given.images, given.page.parent)))
+    print(given.page)
     return 0
 
 
@@ -149,17 +157,6 @@ def predictions(outcome: Outcome, concealed: dict[str, list[Trial]]) -> tuple[li
         }
         rows.append({"trial": trial.name, "tests": group, "rmsd_f0": scores})
     return rows, arrays
-
-
-def table(found: dict[str, Any]) -> str:
-    """Predictions of concealed trials as Markdown, % F0."""
-    rows = found["concealed"]
-    labels = list(rows[0]["rmsd_f0"]) if rows else []
-    lines = ["| concealed | trial | " + " | ".join(labels) + " |", "|---|---|" + "---|" * len(labels)]
-    for row in rows:
-        cells = ["–" if row["rmsd_f0"][n] is None else f"{100.0 * row['rmsd_f0'][n]:.2f}" for n in labels]
-        lines.append(f"| {row['tests']} | {row['trial']} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ class Case:
 
     Attributes:
         key: of the command line and of files.
+        about: Markdown that begins its section: what is shown, what is concealed, what is assumed.
         imports: mapping file below scripts/datasets and files below the folder of recordings.
         shown: regular expressions of the trials that are diagnosed.
         concealed: the same of those that are only predicted, by what they test.
@@ -35,6 +36,7 @@ class Case:
     """
 
     key: str
+    about: str
     imports: tuple[tuple[str, str], ...]
     shown: tuple[str, ...]
     concealed: Mapping[str, tuple[str, ...]]
@@ -161,11 +163,39 @@ def _trabecula(trials: Sequence[Trial]) -> Fibre:
     return _as(trials, "2state_rigid_softplus", {"f": 1e-9, **soft_spring(length, force, 130.0)})
 
 
+_ABOUT = {
+    "rat": """## Rat soleus fibre 18Dec2017a
+
+Shown: stretch-shorten-stretch at five pCa. Concealed: the two triangles of 6.4 % L0 at pCa 4.5, 6.6 and 9
+(unsmoothed). The start is the released set.""",
+    "cat": """## Cat soleus, whole muscle (Herzog and Leonard 2002)
+
+Shown: the isometric reference at the short length (43) and active ramps of 3 mm/s to 9 mm from 0, 3 and 6 mm (50,
+47, 45). Concealed: the isometric references at the long length, the ramps of 27 mm/s and the passive ramps. The
+effect is known: residual force enhancement, more force after an active stretch than isometrically at the same
+length. Assumed: calcium of 8 uM while stimulated, so trials end with stimulation; lengths are straight between the
+corners, because the model would make 3 % F0 of the record's wobble. The passive force is known from rest before
+stimulation at 0, 3 and 6 mm alone, and the base's parallel spring is linear.""",
+    "trabecula_relaxed": """## Mouse trabecula, relaxed
+
+Cross-bridges are off (no attachment): the base is a soft parallel spring. Shown: ramps of 22.5 % L0 in 0.1, 10 and
+100 s; concealed: in 1 s. F0 is an assumption (50 kPa).""",
+    "trabecula_blocked": """## Mouse trabecula, cross-bridges blocked with mavacamten
+
+Shown: relaxed ramps of 0.1 and 10 s, blocked ones of 0.1 s at pCa 6.2, 5.8 and 4.4 and of 10 s at 4.4. Concealed:
+ramps of 1 and 100 s, relaxed and at pCa 4.4. Calcium changes passive force here with cross-bridges off.""",
+    "gastrocnemius": """## Rat gastrocnemius in situ
+
+Shown: two isometric contractions, a quick release, two releases with a ramp, one stretch-shortening cycle of 5 Hz.
+Concealed: another contraction, release, two ramps and four kinds of cycles. The start is a rat soleus fibre, a
+slower muscle; calcium comes from stimulation.""",
+}
 _TRIANGLES = (r"triangle\d_pca\d+",)
 _MOUSE = (("mouse_trabecula_titin", "mouse_trabecula_titin/*.csv"),)
 _CASES = (
     Case(
         "rat",
+        _ABOUT["rat"],
         (
             ("rat_soleus_18Dec2017a", "rat_soleus_18Dec2017a/amp*.csv"),
             ("rat_soleus_18Dec2017a_triangles", "rat_soleus_18Dec2017a/triangle*.csv"),
@@ -177,6 +207,7 @@ _CASES = (
     ),
     Case(
         "cat",
+        _ABOUT["cat"],
         (("cat_soleus_herzog_leonard_2002", "cat_soleus_herzog_leonard_2002/*.csv"),),
         (r"fig6and7A_trial43", r"fig6and7A_trial45", r"fig6and7A_trial47", r"fig6and7A_trial50"),
         {
@@ -190,6 +221,7 @@ _CASES = (
     ),
     Case(
         "trabecula_relaxed",
+        _ABOUT["trabecula_relaxed"],
         _MOUSE,
         (r"AvgRelaxed_0\.1s", r"AvgRelaxed_10s", r"AvgRelaxed_100s"),
         {"unseen speed": (r"AvgRelaxed_1s",)},
@@ -198,6 +230,7 @@ _CASES = (
     ),
     Case(
         "trabecula_blocked",
+        _ABOUT["trabecula_blocked"],
         _MOUSE,
         (
             r"AvgRelaxed_0\.1s", r"AvgRelaxed_10s", r"AvgMava_pCa6\.2_0\.1s", r"AvgMava_pCa5\.8_0\.1s",
@@ -212,6 +245,7 @@ _CASES = (
     ),
     Case(
         "gastrocnemius",
+        _ABOUT["gastrocnemius"],
         (("rat_gastrocnemius_in_situ", "rat_gastrocnemius_in_situ/*.csv"),),
         (r"GMe1_ISOM01", r"GMe1_ISOM12", r"GMe1_QR03", r"GMe1_SR01", r"GMe1_SR06", r"GMe1_SSC_PA05_1"),
         {
