@@ -54,7 +54,8 @@ def _verdict(facts: Mapping[str, Any], found: Mapping[str, Any]) -> str:
     effort = "quick" if facts["quick"] else "full"
     lines = [
         f"Verdict (`{facts['model']}`, {len(facts['trials'])} trials, {effort} search): "
-        f"**{facts['verdict']}{answer}**, confidence {facts['confidence']:.2f}. Best explanation found: {found['best_found']}."
+        f"**{facts['verdict']}{answer}**, confidence {facts['confidence']:.2f}. "
+        f"Best explanation found: {found['best_found']}."
     ]
     lines += [f"- {'passed' if c['passed'] else 'failed'}: {c['name']} ({c['value']})" for c in facts["checks"]]
     lines += [f"- missing: {line}" for line in facts["missing"]]
