@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,8 @@ Array = npt.NDArray[np.float64]
 _LEAST, _MOST = 20, 1000
 # From here on a window's drift may be curved.
 _CURVED = 200
+# Calcium that moves by less than this share of its range from sample to sample stays as it is.
+_CALM = 1e-4
 _ORDER = 6
 # Other trials' windows bear on a trial's colour as if they had this many samples together at most: colour at pCa 9 is
 # not that at pCa 4.5.
@@ -166,9 +169,23 @@ def isometric_window(trial: Trial) -> Window:
             begin_s = longest.end_s - (longest.end_s - longest.start_s) / 3.0
             begin, end = np.searchsorted(time_s, [begin_s, longest.end_s])
             inside = slice(int(begin), int(end))
+    inside = _same_calcium(trial, inside)
     found = slice(max(inside.start, inside.stop - _MOST), inside.stop)
     step_s = float(np.median(np.diff(time_s[found]))) if found.stop - found.start > 1 else math.nan
     return Window(trial.facts.trial, step_s, np.asarray(trial.measured_f0[found]))
+
+
+def _same_calcium(trial: Trial, inside: slice) -> slice:
+    """The longest part of a window in which calcium stays as it is; after a change of calcium, without its first third.
+
+    A stimulated muscle's force comes and goes while its length is held; that is no noise.
+    """
+    given = trial.calcium_um[np.searchsorted(trial.calcium_time_s, trial.force_time_s[inside], side="right") - 1]
+    moving = np.abs(np.diff(given)) > _CALM * np.ptp(trial.calcium_um)
+    edges = [0, *(np.flatnonzero(moving) + 1).tolist(), given.size]
+    begin, end = max(pairwise(edges), key=lambda part: part[1] - part[0])
+    begin += (end - begin) // 3 if begin > 0 else 0
+    return slice(inside.start + begin, inside.start + end)
 
 
 def noise_model(windows: Sequence[Window]) -> NoiseModel:

@@ -114,7 +114,13 @@ def _best_start(
 
 
 def heldout_mse(study: Study, explanation: Explanation, values: Mapping[str, float], trial: FitTrial) -> float:
-    """Mean square difference in a trial that the fit did not see, F0².
+    """Mean square difference in a trial that the fit did not see, F0²; 1 where the model has no solution."""
+    predicted = heldout_force(study, explanation, values, trial)
+    return 1.0 if predicted is None else float(np.mean((predicted - trial.measured_f0) ** 2))
+
+
+def heldout_force(study: Study, explanation: Explanation, values: Mapping[str, float], trial: FitTrial) -> Array | None:
+    """Recorded force of a trial that the fit did not see, F0; None where the model has no solution.
 
     Faults that are the trial's or its solution's own are estimated from its force before anything moves, and from
     nothing else; without that the predictions of all explanations would differ by their solutions, not by stretches.
@@ -126,7 +132,9 @@ def heldout_mse(study: Study, explanation: Explanation, values: Mapping[str, flo
     study_faults = [n for n in explanation.faults if FAULTS[n.value].scope is Scope.STUDY]
     fixed = fault_coordinates([n.value for n in study_faults], [trial.name], [trial.solution], {})
     free = fault_coordinates([n.value for n in own], [trial.name], [trial.solution], {})
-    still = trial.force_time_s <= trial.isometric_s
+    # Where nothing ever moves, there is no force before: all of it is what is to be predicted.
+    before_s = trial.isometric_s if trial.isometric_s < trial.time_s[-1] else -np.inf
+    still = trial.force_time_s <= before_s
     coordinates = (*fixed, *free)
     z = np.array([*(values.get(c.label, 0.0) for c in fixed), *(0.0 for _ in free)])
     problem = Problem(fibre, (trial,), coordinates, {}, correction=study.correction(len(coordinates)))
@@ -138,10 +146,9 @@ def heldout_mse(study: Study, explanation: Explanation, values: Mapping[str, flo
             calm = replace(problem, trials=(quiet,), coordinates=free, correction=study.correction(len(free)))
             found = descend(Objective(Training(calm), SCALE), np.zeros(len(free)), most=10, tolerance=1e-3)
             z[len(fixed) :] = found.z
-        predicted = problem.predicted(z)[0]
+        return problem.predicted(z)[0]
     except UserError:
-        return 1.0
-    return float(np.mean((predicted - trial.measured_f0) ** 2))
+        return None
 
 
 def residuals(study: Study, fit: Fit) -> dict[str, Array]:
