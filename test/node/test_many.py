@@ -322,42 +322,53 @@ def test_bad_samples_are_refused_one_by_one(make: Callable[..., Bench], batch: M
     trouble = bench.realtime.take_calcium(SECOND, every, np.full(3, 1.0))
     assert len(trouble) == 3
     bench.until(lambda: bench.realtime._states[0, -3] == pytest.approx(0.01))
-    assert bench.realtime._taken.tolist() == [[2, 1], [2, 1], [1, 1]]
+    assert bench.realtime._samples.taken.tolist() == [[2, 1], [2, 1], [1, 1]]
 
 
 @pytest.mark.parametrize("on_timeout", ["hold", "isometric", "decay"])
-def test_each_fibre_has_its_watchdog(make: Callable[..., Bench], batch: MuscleBatch, on_timeout: str) -> None:
-    """The one whose length stays away does what it should, the others go on; one line when it begins and ends."""
+def test_each_fibre_has_its_watchdog(batch: MuscleBatch, notes: Any, on_timeout: str) -> None:
+    """The one whose length stays away does what it should, the others go on; one line when it begins and ends.
+
+    Without the thread: ticks are called with deadlines of the test's own.
+    """
     settings = SETTINGS._replace(
-        timeout_s=0.15, on_timeout=on_timeout, decay_s=0.02, extrapolate=True, extrapolation_limit_s=1.0
+        timeout_s=0.1, on_timeout=on_timeout, decay_s=0.02, extrapolate=True, extrapolation_limit_s=1.0
     )
-    bench = make(batch, settings)
-    every = fibres(0, 1, 2)
-    bench.realtime.take_calcium(0, every, np.full(3, 30.0))
-    bench.realtime.take_length(0, every, np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.02, 0.0]))
+    realtime = Bench(batch, settings, notes).realtime
+    realtime._dt = 1e-3
+    every, samples = fibres(0, 1, 2), realtime._samples
+    realtime.take_calcium(0, every, np.full(3, 30.0))
+    realtime.take_length(0, every, np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.02, 0.0]))
+    start = int(samples.inputs.arrival_ns[1])
+    assert not realtime._ready()
+    assert realtime._ready()
 
-    def keep_feeding() -> bool:
-        bench.realtime.take_length(0, fibres(0, 2), np.array([0.1, 0.3]), None)
-        return bool(bench.realtime.status().on_timeout)
+    def tick_until(end_ms: int, begin_ms: int) -> None:
+        for k in range(begin_ms, end_ms):
+            # The others get a sample every millisecond.
+            arrivals = np.array([start + k * 1_000_000, start, start + k * 1_000_000])
+            samples.put(samples.inputs._replace(arrival_ns=arrivals))
+            realtime._tick(start + k * 1_000_000)
 
-    bench.until(keep_feeding)
+    tick_until(101, 1)
+    assert realtime.status().on_timeout == ""
+    assert realtime._states[1, -3] == pytest.approx(0.01)
+    tick_until(200, 101)
+    assert realtime.status().on_timeout == f"{on_timeout} (right)"
+    states = realtime._states
     # Carried on at 0.1 L0/s until then, and held from then on.
-    end = time.monotonic() + 0.1
-    while time.monotonic() < end:
-        keep_feeding()
-        time.sleep(0.002)
-    assert bench.realtime.status().on_timeout == f"{on_timeout} (right)"
-    states = bench.realtime._states
     assert states[1, -2] == 0.0
-    assert states[1, -3] == (0.0 if on_timeout == "hold" else pytest.approx(0.015, abs=2e-3))
-    assert (states[1, -1] < 1.0) == (on_timeout == "decay")
+    assert states[1, -3] == (0.0 if on_timeout == "hold" else pytest.approx(0.01, abs=2e-4))
+    assert states[1, -1] == (pytest.approx(30.0 * np.exp(-99.0 / 20.0)) if on_timeout == "decay" else 30.0)
     assert states[0, -1] == 30.0
-    bench.realtime.take_length(0, every, np.array([0.1, 0.2, 0.3]), None)
-    bench.until(lambda: not bench.realtime.status().on_timeout)
-    assert bench.realtime.status().timeouts >= 1
-    begun, over = [line for line in bench.notes.lines if "right" in line][:2]
-    assert begun.startswith("error right: no length for 0.15")
-    assert over.startswith("info right: length is in time again")
+    realtime.take_length(0, every, np.array([0.1, 0.2, 0.3]), None)
+    realtime._tick(int(samples.inputs.arrival_ns[1]) + 1_000_000)
+    status = realtime.status()
+    assert (status.on_timeout, status.timeouts) == ("", 1)
+    assert notes.lines == [
+        f"error right: no length for 0.101 s, timeout_s is 0.1 s: {on_timeout}",
+        f"info right: length is in time again: {on_timeout} ends",
+    ]
 
 
 def test_a_fibre_that_fails_leaves_and_the_others_tick_on(make: Callable[..., Bench], batch: MuscleBatch) -> None:

@@ -183,6 +183,32 @@ def test_realtime_serves_many_from_one_file(start: Callable[..., Any]) -> None:
     assert report["fibre"] == "m0, m1, m2 and 17 more"
 
 
+def test_fibres_can_be_others_after_a_clean_up(start: Callable[..., Any]) -> None:
+    """Their parameters go and come with them; one name alone is a list as well."""
+    from lifecycle_msgs.msg import Transition
+    from lifecycle_msgs.srv import ChangeState
+
+    def change(label: str) -> bool:
+        number = getattr(Transition, f"TRANSITION_{label}")
+        request = ChangeState.Request(transition=Transition(id=number))
+        return bool(driver.link.call(ChangeState, "change_state", request, timeout_s=60.0).success)
+
+    driver = start(wait=False, autostart=False, fibers="[a, b]", mode="lockstep")
+    f0 = "constants.f0_n"
+    assert change("CONFIGURE")
+    driver.link.set_parameters({f"a.{f0}": 5.0, "a.models.3state_coop.f": 70.0})
+    assert change("CLEANUP")
+    assert driver.link.parameters([f"a.{f0}"]) == {}
+    driver.link.set_parameters({"fibers": ["c"], "model": "2state"})
+    assert change("CONFIGURE")
+    assert driver.link.parameters([f"a.{f0}", f"c.{f0}", "model"]) == {f"c.{f0}": 1.0, "model": "2state"}
+    assert change("ACTIVATE")
+    driver.ready()
+    driver.meet("c")
+    driver.send("calcium", 0.0, 5.0, name=["c"])
+    assert list(driver.ask(1.0, 1.0, name=["c"]).name) == ["c"]
+
+
 def test_fibres_that_do_not_fit_fail_the_configuration(domain: int) -> None:
     """One line that names the remedy."""
     from xb_muscle_ros.node.process import NodeProcess

@@ -18,7 +18,9 @@ from xb_muscle_ros.node.status import Status
 class Stepping(Protocol):
     """What is reported of the stepping."""
 
-    counts: Counts
+    @property
+    def counts(self) -> Counts:
+        """What was odd about the input that was taken."""
 
     def status(self) -> Status:
         """How it goes."""

@@ -25,6 +25,10 @@ class Tendon(NamedTuple):
         """Pull along the tendon at a stretch beyond that of the start, F0."""
         return _C1 * math.exp(_K * (self.rest + stretch_m / self.slack_m - _C2)) - _C3
 
+    def stiffness_f0_per_m(self, stretch_m: float) -> float:
+        """Slope of `force_f0`."""
+        return _K * (self.force_f0(stretch_m) + _C3) / self.slack_m
+
 
 def tendon_at(force_f0: float, slack_m: float) -> Tendon:
     """The tendon that pulls with a force at the start.
