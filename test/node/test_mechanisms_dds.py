@@ -26,9 +26,7 @@ def test_force_through_the_node_is_that_of_replay(method: str, domain: int, tmp_
 
     given = load_fibre(FIBRE, "3state_coop", method)
     name = with_mechanisms(given.model, "viscous_drag", "length_dependent_activation")
-    values = complete(
-        {**given.values, "smoothing": 0.0, "drag": 0.02, "calcium_per_length": 1.5}, name, "test", method
-    )
+    values = complete({**given.values, "smoothing": 0.0, "drag": 0.02, "calcium_per_length": 1.5}, name, "test", method)
     path = tmp_path / "augmented.yaml"
     write_fibre(path, replace(given, model=name, values=MappingProxyType(values)))
     fibre = load_fibre(path)

@@ -109,7 +109,8 @@ def decide(e: Evidence) -> Decision:
     if not explanation.names:
         return Decision(Verdict.UNEXPLAINED, (), None, _sure(1.0 - e.p_value), (), ())
     share = explained(search.base, search.final, e.noise_f0)
-    part = [n for n in explanation.names if _comes_back(search, n, e.noise_f0) >= _PART]
+    first = _by_importance(search, explanation.names)[0]
+    part = [n for n in explanation.names if n is first or _comes_back(search, n, e.noise_f0) >= _PART]
     mechanisms = _by_importance(
         search, [n for n in part if n in explanation.mechanisms and _has_own_doing(search, n, e.noise_f0)]
     )
