@@ -72,30 +72,40 @@ class Significance:
         return whole or bool(np.any(self.counts(alpha)))
 
     def mismatch(self, alpha: float = 0.05) -> list[dict[str, Any]]:
-        """Cells that count, largest first, as rows of plain data; sizes in F0.
+        """Cells that count as rows of plain data, those of the phases with the largest residual first; sizes in F0.
 
         The times are those between which the smoothed residual exceeds the cell's floor.
         """
         values = np.concatenate([r.value_f0 for r in self.residuals])
         times = np.concatenate([r.time_s for r in self.residuals])
         rows = []
-        for i in sorted(np.flatnonzero(self.counts(alpha)), key=lambda i: -float(self.rms_f0[i])):
+        for i in np.flatnonzero(self.counts(alpha)):
             cell = self.cells[i]
             here = slice(cell.begin, cell.end)
             start_s, end_s = exceeding(times[here], values[here], float(self.floor_f0[i]))
-            rows.append(
-                {
-                    "trial": cell.trial,
-                    "phase": cell.phase,
-                    "start_s": start_s,
-                    "end_s": end_s,
-                    "size_f0": float(self.rms_f0[i]),
-                    "mean_f0": float(self.mean_f0[i]),
-                    "sign": 1 if self.mean_f0[i] >= 0.0 else -1,
-                    "p_value": float(self.p_value[i]),
-                }
-            )
-        return rows
+            phase, size = self._phase(cell)
+            row = {
+                "trial": cell.trial,
+                "phase": phase,
+                "start_s": start_s,
+                "end_s": end_s,
+                "size_f0": float(self.rms_f0[i]),
+                "mean_f0": float(self.mean_f0[i]),
+                "sign": 1 if self.mean_f0[i] >= 0.0 else -1,
+                "p_value": float(self.p_value[i]),
+            }
+            rows.append((size, float(self.rms_f0[i]), row))
+        return [row for _, _, row in sorted(rows, key=lambda r: r[:2], reverse=True)]
+
+    def _phase(self, cell: Cell) -> tuple[str, float]:
+        """Name of the phase that a cell is part of, and the residual's root mean square over all of it, F0."""
+        r = next(r for r in self.residuals if r.trial == cell.trial)
+        middle = 0.5 * (cell.start_s + cell.end_s)
+        phase = next((p for p in r.phases if p.start_s <= middle <= p.end_s), None)
+        if phase is None:
+            return cell.phase, float(self.rms_f0[self.cells.index(cell)])
+        inside = (r.time_s >= phase.start_s) & (r.time_s <= phase.end_s)
+        return phase.name, float(np.sqrt(np.mean(r.value_f0[inside] ** 2)))
 
     def map(self) -> dict[str, Any]:
         """Trials by phases, as plain data; None where a trial lacks a phase."""

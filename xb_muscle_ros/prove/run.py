@@ -72,6 +72,7 @@ def _diagnose(task: Mapping[str, Any]) -> dict[str, JsonValue]:
             Path(task["out"]),
             bool(task["quick"]),
             int(task["seed"]),
+            report=False,
         )
     except UserError as error:
         return {"error": str(error), "seconds": time.perf_counter() - start}
