@@ -110,7 +110,9 @@ def benchmark_folder(tmp_path: Path) -> Path:
 def _tool(monkeypatch: pytest.MonkeyPatch, seen: list[str]) -> None:
     """A stand-in for the tool that knows the answers of `SAID`."""
 
-    def diagnose_bags(bags: Any, fiber: Path, out: Path, quick: bool = False, seed: int = 1) -> dict[str, Any]:
+    def diagnose_bags(
+        bags: Any, fiber: Path, out: Path, quick: bool = False, seed: int = 1, report: bool = True
+    ) -> dict[str, Any]:
         name = fiber.parent.name
         seen.append(name)
         if name == "case_0010":
