@@ -77,6 +77,10 @@ class Recordings:
         sds = np.array([noise.sd_f0 for noise in self.noise.of(names).trials])
         return float(np.sqrt(np.average(sds**2, weights=sizes)))
 
+    def usual_noise_f0(self) -> float:
+        """Median over trials of the noise's standard deviation, F0: one trial's slow creep is not everybody's noise."""
+        return float(np.median([noise.sd_f0 for noise in self.noise.trials]))
+
     def law(self, study: Study, linear: Linear) -> Law | None:
         """The law of what a fit left."""
         return law(self.residuals(study, linear), linear.fit, _scalings(study, linear))

@@ -204,7 +204,7 @@ _NOISY_F0, _UNDESCRIBED = 0.02, 0.5
 def _described(recordings: Recordings, search: Search, measured: Sequence[Any]) -> bool:
     """Whether there is anything to build on."""
     spread = float(np.std(np.concatenate(list(measured))))
-    return recordings.noise_rms_f0(search.study) <= _NOISY_F0 and search.final.rmsd_f0 <= _UNDESCRIBED * spread
+    return recordings.usual_noise_f0() <= _NOISY_F0 and search.final.rmsd_f0 <= _UNDESCRIBED * spread
 
 
 def _missing(
@@ -214,7 +214,7 @@ def _missing(
     lines = []
     if not folds:
         lines.append("at least three trials, so that some can be held out: without that no mechanism is named")
-    noise = recordings.noise_rms_f0(search.study)
+    noise = recordings.usual_noise_f0()
     if noise > _NOISY_F0:
         lines.append(f"force with less noise: {100 * noise:.1f} % F0 hides what is looked for")
     spread = float(np.std(np.concatenate(list(measured))))
