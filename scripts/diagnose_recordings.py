@@ -24,6 +24,7 @@ from recorded_figures import write_figure
 from recorded_page import write_page
 
 from xb_muscle_ros.diagnose.closure import by_distribution, closure_error
+from xb_muscle_ros.diagnose.mismatch import simulated
 from xb_muscle_ros.diagnose.outcome import Outcome, as_json, write
 from xb_muscle_ros.diagnose.refit import Fit, heldout_force
 from xb_muscle_ros.diagnose.run import diagnose
@@ -132,7 +133,7 @@ def fitted(fibre: Fibre, trials: Sequence[Trial], options: Options, starts: int)
 
 
 def predictions(outcome: Outcome, concealed: dict[str, list[Trial]]) -> tuple[list[dict[str, Any]], dict[str, Array]]:
-    """How well fits to the shown trials predict each concealed one, and forces of base and answer.
+    """How well fits to the shown trials predict each concealed one, and forces of base and best explanation.
 
     What a trial's own measurement may be off by is estimated from its force before anything moves.
     """
@@ -145,11 +146,17 @@ def predictions(outcome: Outcome, concealed: dict[str, list[Trial]]) -> tuple[li
     if outcome.study.closure_f0:
         study = Study(study.fibre, unseen, closure_error(study, search.base))
     groups = [name for name, group in concealed.items() for _ in group]
-    rows, arrays = [], {}
+    rows: list[dict[str, Any]] = []
+    arrays: dict[str, Array] = {}
+    for key, f in (("before", search.base), ("after", search.final)):
+        for k, force in enumerate(simulated(outcome.study, f)):
+            arrays[f"s{k}_{key}_f0"] = force
+    for k, trial in enumerate(outcome.study.trials):
+        arrays |= {f"s{k}_time_s": trial.force_time_s, f"s{k}_measured_f0": trial.measured_f0}
     for k, (group, trial) in enumerate(zip(groups, unseen, strict=True)):
         forces = {label: foretold(study, f, trial) for label, f in fits.items()}
         arrays |= {f"p{k}_time_s": trial.force_time_s, f"p{k}_measured_f0": trial.measured_f0}
-        for key, f in (("before", search.base), ("after", outcome.shown)):
+        for key, f in (("before", search.base), ("after", search.final)):
             force = forces[f.explanation.label]
             arrays[f"p{k}_{key}_f0"] = np.full(trial.measured_f0.size, np.nan) if force is None else force
         scores = {

@@ -1,4 +1,4 @@
-"""Figure of one case: what was shown to the diagnosis above, what was concealed below; data, base and answer."""
+"""Figure of one case: what was shown to the diagnosis above, what was concealed below; data, base and best explanation."""
 
 from __future__ import annotations
 
@@ -22,15 +22,14 @@ def write_figure(folder: Path, path: Path) -> Path:
     hidden = [(row["trial"], row["tests"]) for row in found["concealed"]]
     above, below = math.ceil(len(shown) / _COLUMNS), math.ceil(len(hidden) / _COLUMNS)
     with (
-        np.load(folder / "traces.npz") as seen,
         np.load(folder / "predictions.npz") as unseen,
         figure(180.0, 42.0 * (above + below) + 8.0) as made,
     ):
         axes = made.subplots(above + below, _COLUMNS, squeeze=False)
-        panels = [(seen, f"t{k}", *names) for k, names in enumerate(shown)]
-        panels += [(seen, "", "", "")] * (above * _COLUMNS - len(panels))
+        panels = [(unseen, f"s{k}", *names) for k, names in enumerate(shown)]
+        panels += [(unseen, "", "", "")] * (above * _COLUMNS - len(panels))
         panels += [(unseen, f"p{k}", *names) for k, names in enumerate(hidden)]
-        for ax, panel in zip(axes.flat, [*panels, *[(seen, "", "", "")] * (axes.size - len(panels))], strict=True):
+        for ax, panel in zip(axes.flat, [*panels, *[(unseen, "", "", "")] * (axes.size - len(panels))], strict=True):
             if panel[1]:
                 _panel(ax, *panel)
             else:
@@ -41,7 +40,8 @@ def write_figure(folder: Path, path: Path) -> Path:
             lit = [ax for ax in axes[:, column] if ax.axison]
             if lit:
                 lit[-1].set_xlabel("time (s)")
-        axes[0, 0].legend(["measured", "base model", "answer"], frameon=False, fontsize=6.5)
+        named = "" if facts["answer"] else " (not named)"
+        axes[0, 0].legend(["measured", "base model", f"best explanation{named}"], frameon=False, fontsize=6.5)
         path.parent.mkdir(parents=True, exist_ok=True)
         made.savefig(path, dpi=130)
     return path

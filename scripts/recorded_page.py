@@ -93,7 +93,7 @@ def concealed(found: Mapping[str, Any], ends: Sequence[tuple[float, float, float
     ]
     total = [_percent(_overall([row["rmsd_f0"][n] for row in rows])) for n in labels]
     return _table(
-        ["tests", "trial", *labels, f"last {_END_S:g} s: measured / base / answer"], [*cells, ["all", "", *total, ""]]
+        ["tests", "trial", *labels, f"last {_END_S:g} s: measured / base / best"], [*cells, ["all", "", *total, ""]]
     )
 
 
@@ -103,7 +103,7 @@ def _overall(values: Sequence[float | None]) -> float | None:
 
 
 def _ends(arrays: Mapping[str, Any], key: str) -> tuple[float, float, float]:
-    """Mean forces at the end of a trial: measured, base, answer."""
+    """Mean forces at the end of a trial: measured, base, best explanation."""
     time = arrays[f"{key}_time_s"]
     late = time >= time[-1] - _END_S
     measured, before, after = (float(np.mean(arrays[f"{key}_{n}_f0"][late])) for n in ("measured", "before", "after"))
