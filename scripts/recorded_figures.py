@@ -1,4 +1,4 @@
-"""Figure of one case: what was shown to the diagnosis above, what was concealed below; data, base and best explanation."""
+"""Figure of one case: what the diagnosis was shown above, what was concealed below; data, base, best explanation."""
 
 from __future__ import annotations
 
