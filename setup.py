@@ -27,6 +27,7 @@ setup(
         (f"share/{NAME}/launch", files("launch/*.launch.py")),
         (f"share/{NAME}/config", files("config/*.*")),
         (f"share/{NAME}/config/fibers", files("config/fibers/*.yaml")),
+        (f"share/{NAME}/config/fibers/augmented", files("config/fibers/augmented/*.yaml")),
         # `ros2 run` and launch look in lib/<package>; pip puts console scripts only in bin/.
         (f"lib/{NAME}", files("scripts/ros/*")),
     ],

@@ -7,7 +7,7 @@ import importlib.util
 from dataclasses import replace
 from pathlib import Path
 
-from xb_muscle_ros.models.fibre_file import find_fibre_file, load_fibre
+from xb_muscle_ros.models.fibre_file import fibre_folders, find_fibre_file, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.offline import simulate_trial
 from xb_muscle_ros.replay.run import replay, write_results
@@ -21,6 +21,9 @@ _RECORDINGS = Path("../shared/data/recordings")
 _MAPPING = Path("scripts/datasets/rat_soleus_18Dec2017a.yaml")
 _FILES = "rat_soleus_18Dec2017a/amp*.csv"
 _PCAS = (4.5, 6.1, 6.3, 6.6, 9.0)
+# The fibre with what a diagnosis of its recordings found missing, and how long it runs at which rate.
+AUGMENTED = Path("augmented") / f"{FIBRE}.yaml"
+_REALTIME_S, _RATE_HZ = 5.0, 1000.0
 
 
 def demo(recordings: Path | None, out: Path, live: bool) -> int:
@@ -62,10 +65,28 @@ def demo(recordings: Path | None, out: Path, live: bool) -> int:
             for a, b in zip(offline.simulated, through_node.simulated, strict=True)
         )
         print(f"\nforce through the node equals offline replay {'bit for bit' if agrees else 'NOT BIT FOR BIT'}")
+        _augmented_in_realtime()
     print("\nresults:")
     for path in write_results(out, trials, offline, through_node):
         print(f"  {path.resolve()}")
     return 0 if agrees else 1
+
+
+def _augmented_in_realtime() -> None:
+    """The diagnosed model of the fibre in a realtime node, and how punctual that is."""
+    from xb_muscle_ros.node.timing import run_timing
+
+    path = next((f / AUGMENTED for f in fibre_folders() if (f / AUGMENTED).is_file()), None)
+    if path is None:
+        return
+    fibre = load_fibre(path)
+    found = run_timing(_REALTIME_S, _RATE_HZ, str(path))
+    late = f"late by {found['lateness_p50_us']:.0f} µs (median), {found['lateness_p99_us']:.0f} µs (99 %)"
+    print(
+        f"\nmodel {fibre.model} (method {fibre.method}), found by diagnosis, in muscle_node at {_RATE_HZ:g} Hz for "
+        f"{_REALTIME_S:g} s: {found['rate_hz']:.1f} ticks per second, {late}, {found['cpu_share'] * 100:.0f} % of a core, "
+        f"{found['state_violations']:.0f} state violations"
+    )
 
 
 def _import(files: list[Path], folder: Path) -> list[Path]:
