@@ -84,7 +84,7 @@ def _augmented_in_realtime() -> None:
     late = f"late by {found['lateness_p50_us']:.0f} µs (median), {found['lateness_p99_us']:.0f} µs (99 %)"
     print(
         f"\nmodel {fibre.model} (method {fibre.method}), found by diagnosis, in muscle_node at {_RATE_HZ:g} Hz for "
-        f"{_REALTIME_S:g} s: {found['rate_hz']:.1f} ticks per second, {late}, {found['cpu_share'] * 100:.0f} % of a core, "
+        f"{_REALTIME_S:g} s: {found['rate_hz']:.1f} ticks/s, {late}, {found['cpu_share'] * 100:.0f} % of a core, "
         f"{found['state_violations']:.0f} state violations"
     )
 
