@@ -41,7 +41,8 @@ def write_figure(folder: Path, path: Path) -> Path:
             if lit:
                 lit[-1].set_xlabel("time (s)")
         named = "" if facts["answer"] else " (not named)"
-        axes[0, 0].legend(["measured", "base model", f"best explanation{named}"], frameon=False, fontsize=6.5)
+        labels = ["measured", "base model", f"best explanation{named}"]
+        made.legend(axes[0, 0].lines, labels, loc="outside upper center", ncols=3, frameon=False, fontsize=6.5)
         path.parent.mkdir(parents=True, exist_ok=True)
         made.savefig(path, dpi=130)
     return path

@@ -44,7 +44,8 @@ def section(key: str, about: str, folder: Path, images: str) -> str:
         _verdict(facts, found),
         "Where the base differs most:\n\n" + places(facts["mismatch"]),
         "What was tried:\n\n" + candidates(facts["candidates"]),
-        "Concealed trials:\n\n" + concealed(found, ends),
+        "Concealed trials (–: no solution at these parameters, heads are stretched past where the form of their "
+        "distribution holds):\n\n" + concealed(found, ends),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 

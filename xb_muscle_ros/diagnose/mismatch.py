@@ -70,13 +70,6 @@ class Recordings:
         """Of what a fit left."""
         return significance(self.residuals(study, linear), linear.fit, self.noise, self.draws, self.seed)
 
-    def noise_rms_f0(self, study: Study) -> float:
-        """Root-mean-square of the noise over all samples, F0."""
-        names = [t.name for t in study.trials]
-        sizes = np.array([t.measured_f0.size for t in study.trials])
-        sds = np.array([noise.sd_f0 for noise in self.noise.of(names).trials])
-        return float(np.sqrt(np.average(sds**2, weights=sizes)))
-
     def usual_noise_f0(self) -> float:
         """Median over trials of the noise's standard deviation, F0: one trial's slow creep is not everybody's noise."""
         return float(np.median([noise.sd_f0 for noise in self.noise.trials]))

@@ -12,7 +12,7 @@ import numpy as np
 
 from xb_muscle_ros.diagnose.crossval import folds_of, held_out
 from xb_muscle_ros.diagnose.mismatch import Recordings, rmsd, simulated
-from xb_muscle_ros.diagnose.names import MECHANISMS, Name
+from xb_muscle_ros.diagnose.names import MECHANISMS, Name, Verdict
 from xb_muscle_ros.diagnose.next_experiment import Proposal, propose
 from xb_muscle_ros.diagnose.outcome import Outcome, as_json, write
 from xb_muscle_ros.diagnose.profile import known
@@ -21,7 +21,7 @@ from xb_muscle_ros.diagnose.screen import Linear
 from xb_muscle_ros.diagnose.search import QUICK, Effort, Search, Searcher, penalised
 from xb_muscle_ros.diagnose.significance import Significance
 from xb_muscle_ros.diagnose.study import Explanation, Study
-from xb_muscle_ros.diagnose.verdict import Decision, Evidence, decide
+from xb_muscle_ros.diagnose.verdict import Decision, Evidence, decide, explained
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
@@ -116,7 +116,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
         Evidence(
             search=search,
             start_rmsd_f0=rmsd(measured, start_forces),
-            noise_f0=recordings.noise_rms_f0(study),
+            noise_f0=recordings.usual_noise_f0(),
             detected=detected,
             p_value=before.overall_p,
             heldout=scores,
@@ -143,7 +143,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
         proposal=_proposal(search, decision, trials),
         start_forces=start_forces,
         warnings=tuple(warnings),
-        missing=tuple(_missing(recordings, search, folds, measured)),
+        missing=tuple(_missing(recordings, search, folds, measured, decision)),
         seconds=time.monotonic() - begun,
         seed=seed,
     )
@@ -208,10 +208,20 @@ def _described(recordings: Recordings, search: Search, measured: Sequence[Any]) 
 
 
 def _missing(
-    recordings: Recordings, search: Search, folds: Sequence[frozenset[str]], measured: Sequence[Any]
+    recordings: Recordings,
+    search: Search,
+    folds: Sequence[frozenset[str]],
+    measured: Sequence[Any],
+    decision: Decision,
 ) -> list[str]:
     """What a firmer answer would need, a line each."""
     lines = []
+    if decision.verdict is Verdict.UNEXPLAINED and search.final.explanation.names:
+        share = explained(search.base, search.final, recordings.usual_noise_f0())
+        lines.append(
+            f"an explanation that goes further: of those tried, {search.final.explanation.label} takes "
+            f"{100 * share:.0f} % off the mismatch's mean square, which is not enough to name it"
+        )
     if not folds:
         lines.append("at least three trials, so that some can be held out: without that no mechanism is named")
     noise = recordings.usual_noise_f0()
