@@ -27,8 +27,11 @@ PHYSICS = {n.value for n in MECHANISMS}
 
 
 def truth(model: str = "3state_coop", **values: float) -> Fibre:
-    """A fibre that differs from the file's in its parameters, and by what is concealed."""
-    given = changed(load_fibre(FIBRE, model), {"smoothing": 0.0, **values}, "test")
+    """A fibre that differs from the file's in its parameters, and by what is concealed.
+
+    Its heads are distributed as they are, not as the Gaussian form has it: a diagnosis takes that form's error out.
+    """
+    given = changed(load_fibre(FIBRE, model, "characteristics"), {"smoothing": 0.0, **values}, "test")
     scaled = {name: given.values[name] * factor for name, factor in (("f", 1.2), ("k21", 0.85), ("kse", 1.15))}
     return replace(given, values=MappingProxyType({**given.values, **scaled}))
 

@@ -91,6 +91,13 @@ def test_rivals_of_another_family_or_kind_leave_it_open(rival: Name) -> None:
     assert d.family is None
 
 
+def test_rivals_are_no_answer_where_trials_left_out_are_not_predicted() -> None:
+    rival = fit(0.00081, Name.TRANSDUCER_LAG)
+    worse = {"base": scores(0.006), "viscous_drag": scores(0.007)}
+    assert decide(evidence(DRAG, rival, heldout=worse)).verdict is Verdict.UNEXPLAINED
+    assert decide(evidence(DRAG, rival, heldout={})).verdict is Verdict.UNEXPLAINED
+
+
 @pytest.mark.parametrize(
     "against",
     [

@@ -224,6 +224,11 @@ def _missing(
         )
     if not folds:
         lines.append("at least three trials, so that some can be held out: without that no mechanism is named")
+    if decision.verdict is Verdict.UNEXPLAINED and not decision.checks and search.base.rmsd_f0 > 0.01:
+        lines.append(
+            f"a longer time without movement in some trials: what is left, {100 * search.base.rmsd_f0:.1f} % F0, is "
+            "not to be told from noise of which so few samples are known"
+        )
     noise = recordings.usual_noise_f0()
     if noise > _NOISY_F0:
         lines.append(f"force with less noise: {100 * noise:.1f} % F0 hides what is looked for")

@@ -32,6 +32,12 @@ _OF_FLEXIBLE = 0.5
 _AS_GOOD = 1.5
 
 
+_NO_FAULT = "no fault of the measurement explains as much"
+_APART = "the interval of its parameter excludes 0"
+# What rivals make fail, and so does not speak against being ambiguous.
+_OF_RIVALS = (_NO_FAULT, _APART)
+
+
 class Check(NamedTuple):
     """One condition of an answer.
 
@@ -126,7 +132,7 @@ def decide(e: Evidence) -> Decision:
     family = FAMILY[lead] if all(FAMILY[n] == FAMILY[lead] for n in ties) else None
     if not (mechanisms or faults) or not _explains(search, lead, share, e.noise_f0).passed:
         return Decision(Verdict.UNEXPLAINED, (), None, confidence, checks, ties)
-    if family is None:
+    if family is None and all(c.passed for c in checks if c.name not in _OF_RIVALS):
         return Decision(Verdict.AMBIGUOUS, answer, None, confidence, checks, ties)
     if not all(c.passed for c in checks):
         return Decision(Verdict.UNEXPLAINED, (), None, confidence, checks, ties)
@@ -217,16 +223,14 @@ def _checks(e: Evidence, lead: Name, share: float, weights: Mapping[Name, float]
         rival = max((w for n, w in weights.items() if n in MEASUREMENT), default=0.0)
         checks.append(
             Check(
-                "no fault of the measurement explains as much",
+                _NO_FAULT,
                 rival < _TIE * weights[lead],
                 f"weight of the best one {rival:.2g}",
             )
         )
         if e.interval is not None:
             apart = not e.interval[0] <= 0.0 <= e.interval[1]
-            checks.append(
-                Check("the interval of its parameter excludes 0", apart, f"{e.interval[0]:.3g} to {e.interval[1]:.3g}")
-            )
+            checks.append(Check(_APART, apart, f"{e.interval[0]:.3g} to {e.interval[1]:.3g}"))
         checks.append(
             Check("its parameter is off its bounds", not e.at_bound, "at a bound" if e.at_bound else "inside")
         )

@@ -21,8 +21,8 @@ _RECORDINGS = Path("../shared/data/recordings")
 _MAPPING = Path("scripts/datasets/rat_soleus_18Dec2017a.yaml")
 _FILES = "rat_soleus_18Dec2017a/amp*.csv"
 _PCAS = (4.5, 6.1, 6.3, 6.6, 9.0)
-# The fibre with what a diagnosis of its recordings found missing, and how long it runs at which rate.
-AUGMENTED = Path("augmented") / f"{FIBRE}.yaml"
+# A muscle with what the diagnosis of its recordings found missing, and how long it runs at which rate.
+AUGMENTED = Path("augmented") / "GMe1.yaml"
 _REALTIME_S, _RATE_HZ = 5.0, 1000.0
 
 
@@ -73,18 +73,20 @@ def demo(recordings: Path | None, out: Path, live: bool) -> int:
 
 
 def _augmented_in_realtime() -> None:
-    """The diagnosed model of the fibre in a realtime node, and how punctual that is."""
+    """A diagnosed model in a realtime node, and how punctual that is."""
     from xb_muscle_ros.node.timing import run_timing
 
     path = next((f / AUGMENTED for f in fibre_folders() if (f / AUGMENTED).is_file()), None)
     if path is None:
         return
     fibre = load_fibre(path)
-    found = run_timing(_REALTIME_S, _RATE_HZ, str(path))
+    # The measurement moves a fibre of 1 m; forces in F0 do not depend on it.
+    found = run_timing(_REALTIME_S, _RATE_HZ, str(path), settings={"constants.reference_length_m": 1.0})
+    core = 100.0 * found["cpu_share"]
     late = f"late by {found['lateness_p50_us']:.0f} µs (median), {found['lateness_p99_us']:.0f} µs (99 %)"
     print(
-        f"\nmodel {fibre.model} (method {fibre.method}), found by diagnosis, in muscle_node at {_RATE_HZ:g} Hz for "
-        f"{_REALTIME_S:g} s: {found['rate_hz']:.1f} ticks/s, {late}, {found['cpu_share'] * 100:.0f} % of a core, "
+        f"\nmuscle {fibre.name}, model {fibre.model} (method {fibre.method}), found by diagnosis, in muscle_node at "
+        f"{_RATE_HZ:g} Hz for {_REALTIME_S:g} s: {found['rate_hz']:.1f} ticks/s, {late}, {core:.0f} % of a core, "
         f"{found['state_violations']:.0f} state violations"
     )
 
