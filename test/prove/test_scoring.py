@@ -17,6 +17,7 @@ from xb_muscle_ros.prove.judging import judge
 from xb_muscle_ros.prove.make import seal
 from xb_muscle_ros.prove.run import RESULTS, run
 from xb_muscle_ros.prove.score import score
+from xb_muscle_ros.prove.score_figures import confusion
 from xb_muscle_ros.work import Options
 
 CELLS = [
@@ -89,6 +90,11 @@ def test_scores_of_known_results() -> None:
 def test_failure_of_the_tool_is_no_right_answer() -> None:
     judged = judge(KEY[4], {"error": "no such bag"})
     assert (judged.verdict, judged.exact, judged.family, judged.located) == ("error", False, False, None)
+
+
+def test_untouched_recordings_have_no_truth_to_confuse() -> None:
+    judged = [judge(truth("case_0001", "untouched"), said("unexplained")), judge(KEY[4], SAID["case_0005"])]
+    assert confusion(judged).sum() == 1.0
 
 
 def test_interval_is_exact() -> None:

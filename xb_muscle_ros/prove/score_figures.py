@@ -42,7 +42,8 @@ def confusion(judged: Sequence[Judged]) -> Array:
     """Numbers of cases by what is true (rows) and what is answered (columns); pairs have no row of their own."""
     counts = np.zeros((len(_TRUTHS), len(_ANSWERS)))
     for j in judged:
-        if j.kind == "pair":
+        # Of a pair either name is right; what an untouched recording lacks nobody knows.
+        if j.kind in ("pair", "untouched"):
             continue
         truth = j.labels[0] if j.kind in ("single", "fault") else j.kind
         answer = j.answer if j.answer in _ANSWERS else "other"
