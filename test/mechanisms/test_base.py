@@ -35,9 +35,12 @@ def test_sigmoid_is_half_at_kappa() -> None:
 
 def test_thick_filament_by_hand() -> None:
     values = {"J1": 6.0, "J2": 200.0, "JF": 100.0, "q0": 0.3, "drx": 0.2, "forcibly_detached": 0.1}
-    q = Quantities({**values, "force_xb": 0.35, "attachment_rate_net": 1.5}, "force_dependent", None)
+    q = Quantities({**values, "force_xb": 0.35, "attachment_rate_net": 1.5, "recruitment": 0.0}, "", None)
     # 6*(1+100*0.35)*(1-0.3-0.2-0.1) - 200*0.2 - 1.5 = 86.4 - 40 - 1.5
     assert ForceDependentThickFilament().derivatives(q)["drx"] == pytest.approx(44.9)
+    stretched = q.for_block("", recruitment=2.0)
+    # 6*2*(1-0.3-0.2-0.1) more.
+    assert ForceDependentThickFilament().derivatives(stretched)["drx"] == pytest.approx(49.7)
     assert ForceDependentThickFilament().rest(q)["drx"] == pytest.approx(6.0 / 206.0)
 
 
