@@ -149,10 +149,3 @@ def heldout_force(study: Study, explanation: Explanation, values: Mapping[str, f
         return problem.predicted(z)[0]
     except UserError:
         return None
-
-
-def residuals(study: Study, fit: Fit) -> dict[str, Array]:
-    """Measured less predicted force of every trial at the times that count, F0."""
-    problem = fit.problem(study)
-    predicted = problem.predicted(problem.start)
-    return {t.name: t.measured_f0 - p for t, p in zip(problem.trials, predicted, strict=True)}

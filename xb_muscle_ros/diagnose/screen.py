@@ -34,14 +34,11 @@ class Screened(NamedTuple):
         name: of it.
         gain: by how much the cost would fall along its line, everything else giving way, in the cost's unit; nan where
             only a fit can tell.
-        signature_f0: what it adds to the forces that nothing fitted so far could, per unit, concatenated; shape
-            (samples,); empty for faults with several values and where only a fit can tell.
         starts: values to start a fit from.
     """
 
     name: Name
     gain: float
-    signature_f0: Array
     starts: tuple[dict[str, float], ...]
 
 
@@ -99,8 +96,7 @@ def _faults(study: Study, fit: Fit, linear: Linear) -> Iterator[Screened]:
         columns, _ = training.slopes_by(problem.start, own)
         gain, values = linear.gain(columns, np.full(len(own), FAULTS[name.value].sd))
         start = {problem.coordinates[j].label: float(v) for j, v in zip(own, values, strict=True)}
-        signature = linear.fit.left(columns)[:, 0] if len(own) == 1 else np.empty(0)
-        yield Screened(name, gain, signature, ({**fit.values, **start},))
+        yield Screened(name, gain, ({**fit.values, **start},))
 
 
 def _mechanisms(study: Study, fit: Fit, linear: Linear) -> Iterator[Screened]:
@@ -112,7 +108,7 @@ def _mechanisms(study: Study, fit: Fit, linear: Linear) -> Iterator[Screened]:
             continue
         starts = entry_starts(entry, study.fibre, fit.values)
         if entry.effect is None:
-            yield Screened(entry.name, np.nan, np.empty(0), tuple(starts))
+            yield Screened(entry.name, np.nan, tuple(starts))
             continue
         yield _along_lines(study, plain, linear, entry, starts, force)
 
@@ -139,7 +135,7 @@ def _along_lines(
 ) -> Screened:
     """A mechanism at each of its starting values, followed along the line from its absence."""
     assert entry.effect is not None
-    best = Screened(entry.name, 0.0, np.empty(0), (starts[0],))
+    best = Screened(entry.name, 0.0, (starts[0],))
     explanation = plain.plus(entry.name)
     for start in starts:
         problem = study.problem(explanation, start)
@@ -155,14 +151,5 @@ def _along_lines(
         if gain > best.gain:
             share = float(np.sign(share) * np.clip(abs(share), _LEAST_SHARE, _MOST_SHARE))
             begun = {**start, entry.effect: share * effect}
-            best = Screened(entry.name, gain, linear.fit.left(column[:, None])[:, 0], (begun,))
+            best = Screened(entry.name, gain, (begun,))
     return best
-
-
-def overlap(a: Array, b: Array, weights: Array) -> float:
-    """Cosine of two signatures, 0 where one is missing."""
-    if not a.size or not b.size:
-        return 0.0
-    x, y = a * weights, b * weights
-    norm = float(np.linalg.norm(x) * np.linalg.norm(y))
-    return float(x @ y) / norm if norm > 0.0 else 0.0
