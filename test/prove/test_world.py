@@ -53,3 +53,16 @@ def test_unequal_half_sarcomeres_stand_still_at_first(worlds: dict[str, World], 
     world = Truth(worlds["3state_coop"]).changed({At.UNIT_STIFFNESS: 0.005}, (0.93, 1.0, 1.07)).world
     for stimulus in study:
         assert np.ptp(simulate(world, stimulus).force[:200]) < 1e-4
+
+
+def test_ties_bear_nothing_of_what_the_whole_fibre_does(worlds: dict[str, World], study: list[Stimulus]) -> None:
+    plain = worlds["3state_coop"]
+    for stimulus in study:
+        alone = simulate(plain, stimulus).force
+        alike = Truth(plain).changed({At.UNIT_STIFFNESS: 0.005}, (1.0, 1.0, 1.0)).world
+        assert np.max(np.abs(simulate(alike, stimulus).force - alone)) < 1e-9
+        unequal = Truth(plain).changed({At.UNIT_STIFFNESS: 0.005}, (0.8, 1.0, 1.2)).world
+        if stimulus.calcium > 0.1:
+            assert np.max(np.abs(simulate(unequal, stimulus).force - alone)) > 1e-3
+        else:
+            assert np.max(np.abs(simulate(unequal, stimulus).force - alone)) < 1e-3

@@ -13,7 +13,7 @@ from xb_muscle_ros.files import write_text
 from xb_muscle_ros.prove.sealing import BENCHMARK, digest, load_benchmark
 from xb_muscle_ros.work import JsonValue, Options, stream
 
-VERSION = 1
+VERSION = 2
 _ABOUT = (
     "Studies of made fibres, each with its bags and a fibre file that was fitted to another fibre. In some something "
     "is concealed: a mechanism, an effect that has no name, or a fault of the measurement; in some nothing. "

@@ -133,11 +133,14 @@ def _draw_spread(random: np.random.Generator) -> Shape:
     count = int(random.integers(3, 6))
     z = random.standard_normal(count)
     z = (z - z.mean()) / z.std()
-    return {f"unit_{m}": float(value) for m, value in enumerate(z)}
+    tie = float(np.exp(random.uniform(*np.log([0.002, 0.01]))))
+    return {"tie": tie, **{f"unit_{m}": float(value) for m, value in enumerate(z)}}
 
 
 def _spread(truth: Truth, scale: float, shape: Shape) -> Truth:
-    return truth.changed({At.UNIT_STIFFNESS: 0.1 * scale}, tuple(1.0 + scale * z for z in shape.values()))
+    strength = tuple(1.0 + scale * z for name, z in shape.items() if name != "tie")
+    # Ties bear differences only: what stretches the whole fibre is its parallel spring, with and without a spread.
+    return truth.changed({At.UNIT_STIFFNESS: shape["tie"]}, strength)
 
 
 def _compliance(truth: Truth, scale: float, shape: Shape) -> Truth:

@@ -167,22 +167,26 @@ def _balance(
             weak = p[_WK] * unit[WEAK_SITES]
             base = strength[m] * force + unit[WEAK_FORCE] + weak * moved[m]
             base += p[_UK] * (unit[LENGTH] + moved[m])
+            # Ties pull back what lies beyond the mean length X, whose part is put in below.
             slope = strength[m] * stiffness + weak + p[_UK]
             line[m, 0], line[m, 1] = base, max(slope, 1e-12)
             mean += unit[LENGTH] + moved[m] - base / line[m, 1]
             compliance += 1.0 / line[m, 1]
         mean /= count
         compliance /= count
-        # mean + compliance T + series_length(T) = free: rising and concave, so Newton's steps cannot run away.
+        # Each bears T = line + slope d - k X; their lengths' mean is X = free - series_length(T). In T this is rising
+        # and concave, so Newton's steps cannot run away.
+        loose = 1.0 - p[_UK] * compliance
         for _ in range(60):
-            error = mean + compliance * tension + series_length(tension, p) - free
-            step = error / (compliance + series_slope(tension, p))
+            error = mean + compliance * tension + loose * (series_length(tension, p) - free)
+            step = error / (compliance + loose * series_slope(tension, p))
             tension -= step
             if abs(step) < 1e-13 + 1e-12 * abs(tension):
                 break
         largest = 0.0
+        together = p[_UK] * (free - series_length(tension, p))
         for m in range(count):
-            change = (tension - line[m, 0]) / line[m, 1]
+            change = (tension + together - line[m, 0]) / line[m, 1]
             moved[m] += change
             largest = max(largest, abs(change))
         if p[_CURVE] == 0.0 or largest < 1e-9:
@@ -232,7 +236,8 @@ def _expected(units: Array, strength: Array, change: float, shared: Array, p: Ar
         compliance += 1.0 / max(slope, 1e-12) / count
     for m in range(count):
         slope = strength[m] * units[m, Q0] + p[_WK] * units[m, WEAK_SITES] + p[_UK]
-        units[m, LAST_MOVE] += extra / max(slope, 1e-12) / (compliance + series_slope(shared[TENSION], p))
+        loose = 1.0 - p[_UK] * compliance
+        units[m, LAST_MOVE] += extra / max(slope, 1e-12) / (compliance + loose * series_slope(shared[TENSION], p))
 
 
 @compiled

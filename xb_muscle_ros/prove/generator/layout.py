@@ -50,7 +50,7 @@ class At(enum.IntEnum):
     CREEP = 36
     CREEP_TIME = 37
     UNIT_STIFFNESS = 38
-    """Passive stiffness of each half-sarcomere where there are several, slack at length 0, per power stroke."""
+    """Of ties that keep half-sarcomeres together: force per power stroke by which one is longer than their mean."""
     THIN = 39
     THICK = 40
     SERIES = 41

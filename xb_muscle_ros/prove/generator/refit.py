@@ -15,7 +15,8 @@ Array = npt.NDArray[np.float64]
 
 _FITTED = ("f", "k11", "k21", "k22", "kon", "koop", "JF", "kappa", "n", "kse", "kse0")
 _STEP = 0.02
-_SWEEPS = 10
+# Steps at most, how far one may go, and the relative gain below which there is no next one.
+_STEPS, _FARTHEST, _ENOUGH = 20, 0.7, 0.01
 # The fit's samples are worth as many independent ones of this SD (F0), against priors of SD 1 on log-parameters.
 _WORTH = 50.0
 _WORTH_SD = 0.01
@@ -32,19 +33,21 @@ class Refitted(NamedTuple):
         rms: of what is left over all samples, F0.
         left: data minus base, F0, by trial.
         values: of the fitted constants.
+        at: where these lie: changes of their logarithms, and of the parallel spring.
     """
 
     rms: float
     left: list[Array]
     values: dict[str, float]
+    at: Array
 
 
 class Refit:
-    """Fits of one plain base to studies of one plan; the Jacobian is taken once, at the true constants.
+    """Fits of one plain base to studies of one plan, by Levenberg and Marquardt's method.
 
     Attributes:
         names: of the constants that are fitted by their logarithms; kpe and Fpe0 are fitted as well.
-        jacobian: (samples of all trials, fitted constants), F0.
+        jacobian: at the true constants, (samples of all trials, fitted constants), F0.
     """
 
     def __init__(self, base: World, study: Sequence[Stimulus]) -> None:
@@ -57,7 +60,7 @@ class Refit:
         self._base, self._study = base, list(study)
         self.names = tuple(name for name in _FITTED if name in base.values)
         self._at = np.zeros(len(self.names) + len(_PARALLEL_SD))
-        self._plain = np.concatenate(self._forces(self._at))
+        self._plain = self._model(self._at)
         self.jacobian = self._jacobian_at(self._at, self._plain)
         n = self._plain.size
         self._weight = np.sqrt(_WORTH / n) / _WORTH_SD
@@ -71,40 +74,44 @@ class Refit:
         r = np.concatenate(list(forces)) - self._plain
         return float(np.sqrt(np.mean((r - self.jacobian @ self._solve(self.jacobian, r, self._at)) ** 2)))
 
-    def __call__(self, forces: Sequence[Array], thorough: bool = False) -> Refitted:
+    def __call__(self, forces: Sequence[Array], start: Refitted | None = None) -> Refitted:
         """Fit data.
 
         Args:
             forces: of every trial, F0.
-            thorough: take the Jacobian anew where the first descent ended, and go on from there.
+            start: a fit of like data to go on from; None for the true constants.
         """
         data = np.concatenate(list(forces))
-        at, model = self._descend(data, self._at, self._plain, self.jacobian)
-        if thorough:
-            at, model = self._descend(data, at, model, self._jacobian_at(at, model))
+        at, model, jacobian = self._at, self._plain, self.jacobian
+        if start is not None and self._cost(data - (found := self._model(start.at)), start.at) < self._cost(
+            data - model, at
+        ):
+            at, model, jacobian = start.at, found, self._jacobian_at(start.at, found)
+        at, model = self._descend(data, at, model, jacobian)
         left = data - model
-        return Refitted(float(np.sqrt(np.mean(left**2))), self.split(left), self._values(at))
+        return Refitted(float(np.sqrt(np.mean(left**2))), self.split(left), self._values(at), at)
 
     def _descend(self, data: Array, at: Array, model: Array, jacobian: Array) -> tuple[Array, Array]:
-        """Gauss–Newton steps with a Jacobian that learns from each of them (Broyden), shortened where need be."""
-        cost = self._cost(data - model, at)
-        for _ in range(_SWEEPS):
-            step = self._solve(jacobian, data - model, at)
-            step = step / max(1.0, float(np.max(np.abs(step))))
-            for _ in range(4):
-                trial = np.concatenate(self._forces(at + step))
+        """Damped Gauss-Newton steps, the Jacobian taken anew after each.
+
+        Effects that slow or weaken every head lie in a long bent valley of the constants: shortcuts end in its walls.
+        """
+        cost, damping = self._cost(data - model, at), 1e-3
+        for _ in range(_STEPS):
+            last = cost
+            for _ in range(6):
+                step = self._solve(jacobian, data - model, at, damping)
+                step = step * min(1.0, _FARTHEST / max(float(np.max(np.abs(step))), 1e-12))
+                trial = self._model(at + step)
                 found = self._cost(data - trial, at + step)
-                # The matrix learns to map the step taken to the change that was seen.
-                jacobian = jacobian + np.outer(trial - model - jacobian @ step, step) / (step @ step)
                 if found < cost:
+                    at, model, cost, damping = at + step, trial, found, max(damping / 5.0, 1e-6)
                     break
-                step = 0.35 * step
-            else:
+                damping *= 8.0
+            # A cost that is not finite fails every comparison.
+            if not last - cost >= _ENOUGH * cost:
                 break
-            gain = cost - found
-            at, model, cost = at + step, trial, found
-            if gain < 0.01 * cost:
-                break
+            jacobian = self._jacobian_at(at, model)
         return at, model
 
     def _jacobian_at(self, at: Array, model: Array) -> Array:
@@ -112,17 +119,17 @@ class Refit:
         for i in range(at.size):
             moved = at.copy()
             moved[i] += _STEP
-            columns.append((np.concatenate(self._forces(moved)) - model) / _STEP)
+            columns.append((self._model(moved) - model) / _STEP)
         return np.column_stack(columns)
 
     def _cost(self, r: Array, at: Array) -> float:
         return float(self._weight**2 * np.sum(r**2) + np.sum(at**2))
 
-    def _solve(self, jacobian: Array, r: Array, at: Array) -> Array:
+    def _solve(self, jacobian: Array, r: Array, at: Array, damping: float = 0.0) -> Array:
         """Step of the penalised least squares."""
-        a = np.vstack([self._weight * jacobian, np.eye(at.size)])
-        b = np.concatenate([self._weight * r, -at])
-        step: Array = np.linalg.lstsq(a, b, rcond=None)[0]
+        curvature = self._weight**2 * jacobian.T @ jacobian + np.eye(at.size)
+        curvature[np.diag_indices(at.size)] *= 1.0 + damping
+        step: Array = np.linalg.solve(curvature, self._weight**2 * jacobian.T @ r - at)
         return step
 
     def _values(self, at: Array) -> dict[str, float]:
@@ -133,8 +140,8 @@ class Refit:
             values[name] = float(self._base.values[name] + sd * change)
         return values
 
-    def _forces(self, at: Array) -> list[Array]:
-        return study_forces(Truth(self._base.with_values(self._values(at))), self._study, _COARSE)
+    def _model(self, at: Array) -> Array:
+        return np.concatenate(study_forces(Truth(self._base.with_values(self._values(at))), self._study, _COARSE))
 
     def split(self, joined: Array) -> list[Array]:
         """Samples of all trials by trial."""

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 
 from xb_muscle_ros.prove.generator import kernel
 from xb_muscle_ros.prove.generator.layout import At, Series, Thick, Thin
@@ -191,16 +190,12 @@ def _settled(world: World, stimulus: Stimulus, row: Array, mesh: Mesh, p: Array)
     state = _State(np.zeros((count, mesh.bins)), np.zeros((count, kernel.ROWS)), np.zeros(kernel.SHARED), strength)
     for m in range(count):
         kernel.level(float(row[0]), mesh.first, mesh.dx, mesh.bins, p, state.units[m], state.n[m])
-    force, stiffness = float(np.mean(state.units[:, kernel.FORCE])), p[At.UNIT_STIFFNESS]
-    tension = force
-    if stiffness > 0.0:
-        # All half-sarcomeres stand still where what they differ by in strength is borne by their passive springs.
-        tension = float(
-            brentq(lambda t: (t - force) / stiffness + series_length(t, p) - GAMMA * stimulus.length[0], -1e3, 1e3)
-        )
-        state.units[:, kernel.LENGTH] = (tension - strength * state.units[:, kernel.FORCE]) / stiffness
-    else:
-        state.units[:, kernel.LENGTH] = GAMMA * stimulus.length[0] - series_length(tension, p)
+    # Ties bear what half-sarcomeres of one force differ by in strength, and nothing of the fibre's force.
+    borne = strength * state.units[:, kernel.FORCE]
+    tension = float(np.mean(borne))
+    state.units[:, kernel.LENGTH] = GAMMA * stimulus.length[0] - series_length(tension, p)
+    if p[At.UNIT_STIFFNESS] > 0.0:
+        state.units[:, kernel.LENGTH] += (tension - borne) / p[At.UNIT_STIFFNESS]
     state.shared[kernel.TENSION] = tension
     if p[At.CREEP] > 0.0:
         state.shared[kernel.CREPT] = p[At.CREEP] * tension
