@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from xb_muscle_ros.diagnose.crossval import HeldOut
+from xb_muscle_ros.diagnose.mismatch import Bound
 from xb_muscle_ros.diagnose.names import Name, Verdict
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.search import Search
@@ -43,7 +44,7 @@ def evidence(final: Fit, *others: Fit, base: float = 0.006, **changes: Any) -> E
         detected=True,
         p_value=0.004,
         heldout={"base": scores(1.3 * base), final.explanation.label: scores(1.3 * final.rmsd_f0)},
-        flexible_f0=1.4 * final.rmsd_f0,
+        bound=Bound(1.3 * base, 1.3 * final.rmsd_f0, 1.4 * final.rmsd_f0),
         interval=(0.01, 0.03),
         at_bound=False,
         cleaned=0.95,
@@ -107,7 +108,7 @@ def test_rivals_are_no_answer_where_trials_left_out_are_not_predicted() -> None:
         {"at_bound": True},
         {"heldout": {}},
         {"heldout": {"base": scores(0.006), "viscous_drag": scores(0.007)}},
-        {"flexible_f0": 0.0001, "heldout": {"base": scores(0.006), "viscous_drag": scores(0.0045)}},
+        {"bound": Bound(0.006, 0.0045, 0.0001)},
         {"described": False},
     ],
     ids=lambda a: next(iter(a)),

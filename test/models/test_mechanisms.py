@@ -45,11 +45,11 @@ def fibre_with(mechanism: str | None, method: str = "gaussian", base: str = BASE
     return replace(given, model=name, values=MappingProxyType(complete(start, name, "test", method)))
 
 
-def force(fibre: Fibre, pca: float = 6.1, length: np.ndarray = LENGTH) -> np.ndarray:
+def force(fibre: Fibre, pca: float = 6.1, length: np.ndarray = LENGTH, time_s: np.ndarray = TIME) -> np.ndarray:
     muscle = Muscle(fibre)
-    calcium = np.full(TIME.size, 10.0 ** (6.0 - pca))
+    calcium = np.full(time_s.size, 10.0 ** (6.0 - pca))
     start = muscle.settle(float(length[0]), float(calcium[0]), None if fibre.method == "gaussian" else 10.0)
-    return muscle.outputs_of(muscle.run(start, np.diff(TIME), length, calcium))["force_f0"]
+    return muscle.outputs_of(muscle.run(start, np.diff(time_s), length, calcium))["force_f0"]
 
 
 @pytest.fixture(scope="module")
@@ -124,16 +124,21 @@ def test_weakly_bound_heads_reach_a_plateau_in_proportion_to_sites(plain: np.nda
     muscle = Muscle(fibre)
     calcium = np.full(TIME.size, 10.0**-0.1)
     states = muscle.run(muscle.settle(0.0, float(calcium[0])), np.diff(TIME), LENGTH, calcium)
-    sites = muscle.outputs_of(states)["n_on"]
+    out = muscle.outputs_of(states)
+    weak_f0 = states[:, muscle.state_names.index("weak_force")]
     at = 120
-    v = 0.0383 / 0.084
-    assert force(fibre)[at] - plain[at] == pytest.approx(40.0 * sites[at] * v / 500.0, rel=1e-2)
+    expected = 40.0 * out["n_on"][at] * out["ce_velocity_l0_per_s"][at] / 500.0
+    assert weak_f0[at] == pytest.approx(expected, rel=2e-2)
+    # They bear what the others do not, and both pull on the series spring.
+    strong_f0 = fibre.values["Fscale"] * (states[:, 0] + states[:, 1])
+    np.testing.assert_allclose(out["force_ce_f0"], strong_f0 + weak_f0, atol=1e-12)
+    assert force(fibre)[at] - plain[at] > 0.01
 
 
 def test_active_titin_keeps_what_an_active_stretch_gave_it_and_is_slack_below(plain: np.ndarray) -> None:
-    fibre = fibre_with("active_titin", titin_stiffness=2.0, titin_release=0.0, titin_calcium=1e-3)
+    fibre = fibre_with("active_titin", titin_stiffness=2.0, titin_release=0.0, titin_calcium=1e-3, titin_rebinding=0.0)
     extra = force(fibre) - plain
-    np.testing.assert_allclose(extra[320:], 2.0 * 0.0383 * (10.0**-0.1 / (10.0**-0.1 + 1e-3)), rtol=1e-9)
+    np.testing.assert_allclose(extra[320:], 2.0 * 0.0383 / (1.0 + (1e-3 / 10.0**-0.1) ** 2), rtol=1e-9)
     down = force(fibre, length=-LENGTH) - force(fibre_with(None), length=-LENGTH)
     np.testing.assert_allclose(down, 0.0, atol=1e-12)
 
@@ -153,10 +158,46 @@ def test_static_stiffness_follows_length_and_calcium_alone(plain: np.ndarray) ->
 def test_length_acts_as_another_parameter_would(mechanism: str, value: dict[str, float], instead: str) -> None:
     long, calcium = 0.05, 10.0**-0.2
     fibre = fibre_with(mechanism, **value)
-    same = fibre_with(None, **{instead: fibre.values[instead] * float(np.exp(2.0 * long))})
-    ours, theirs = (Muscle(f) for f in (fibre, same))
-    a, b = (m.outputs(m.settle(long, calcium)).force_ce_f0 for m in (ours, theirs))
-    assert a == pytest.approx(b, rel=1e-7)
+    ours = Muscle(fibre)
+    out = ours.outputs(ours.settle(long, calcium))
+    # Filaments come closer where half-sarcomeres are longer, whatever the series spring makes of the fibre's length.
+    change = out.ce_length_change_l0 if mechanism == "lattice_spacing" else long
+    theirs = Muscle(fibre_with(None, **{instead: fibre.values[instead] * float(np.exp(2.0 * change))}))
+    assert out.force_ce_f0 == pytest.approx(theirs.outputs(theirs.settle(long, calcium)).force_ce_f0, rel=1e-7)
+
+
+def test_overlap_changes_beyond_the_edge_of_its_plateau_alone(plain: np.ndarray) -> None:
+    on_plateau = force(fibre_with("filament_overlap", overlap_per_length=-5.0, overlap_edge=0.5))
+    np.testing.assert_allclose(on_plateau, plain, atol=1e-12)
+    # The series spring keeps half-sarcomeres far shorter than the fibre: this edge they pass in the stretch only.
+    edge = float(np.max(_sarcomeres()) - 0.005)
+    bent = force(fibre_with("filament_overlap", overlap_per_length=-5.0, overlap_edge=edge))
+    same = _sarcomeres() < edge
+    first = int(np.argmin(same))
+    assert 0 < first < TIME.size - 1
+    np.testing.assert_allclose(bent[:first], plain[:first], atol=1e-9)
+    assert np.min((bent - plain)[first:]) < -1e-3
+
+
+def _sarcomeres() -> np.ndarray:
+    """Length change of the plain fibre's half-sarcomeres, L0."""
+    muscle, calcium = Muscle(fibre_with(None)), np.full(TIME.size, 10.0**-0.1)
+    states = muscle.run(muscle.settle(float(LENGTH[0]), float(calcium[0])), np.diff(TIME), LENGTH, calcium)
+    found: np.ndarray = muscle.outputs_of(states)["ce_length_change_l0"]
+    return found
+
+
+def test_slack_titin_takes_hold_anew(plain: np.ndarray) -> None:
+    """Shortened and stretched back to where it was: force only if titin took hold where it was short."""
+    time_s = np.arange(0.0, 1.5, 1e-3)
+    length = np.interp(time_s, [0.1, 0.2, 1.2, 1.3], [0.0, -0.03, -0.03, 0.0])
+    values = {"titin_stiffness": 5.0, "titin_release": 0.0}
+    without = force(fibre_with(None), length=length, time_s=time_s)
+    stiff = force(fibre_with("active_titin", **values, titin_rebinding=20.0), length=length, time_s=time_s) - without
+    never = force(fibre_with("active_titin", **values, titin_rebinding=0.0), length=length, time_s=time_s) - without
+    np.testing.assert_allclose(never, 0.0, atol=1e-9)
+    held = 1.0 / (1.0 + 10.0**0.2)
+    assert stiff[-1] == pytest.approx(5.0 * held * 0.03, rel=1e-3)
 
 
 def test_stretch_recruits_as_force_would() -> None:
@@ -209,6 +250,7 @@ def test_hill_type_models_take_what_needs_no_heads(mechanism: str) -> None:
     ("name", "why"),
     [
         ("hill_se+lattice_spacing", "needs heads"),
+        ("hill+weakly_bound_heads", "needs heads"),
         ("2state_coop+strain_recruited_heads", "needs super-relaxed heads"),
         ("3state_coop+thick_filament_cooperativity", "part of this model already"),
         ("3state_coop+viscous_drag+viscous_drag", "named twice"),

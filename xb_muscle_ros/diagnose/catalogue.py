@@ -76,7 +76,8 @@ def _of_sigmoid(base: Mapping[str, float]) -> Starts:
     """Cooperative filaments that are half active where the sigmoid is, at several strengths of cooperativity."""
     kappa = base.get("kappa", 1.0)
     return tuple(
-        {"kon": 80.0 * half / kappa, "koop": koop, "koff": 80.0} for koop, half in ((1.0, 0.7), (3.0, 0.5), (10.0, 0.3))
+        {"kon": koff * half / kappa, "koop": koop, "koff": koff}
+        for koff, koop, half in ((80.0, 1.0, 0.7), (20.0, 3.0, 0.5), (10.0, 10.0, 0.3))
     )
 
 
@@ -106,19 +107,25 @@ _ROWS = (
         Name.ACTIVE_TITIN,
         "titin_stiffness",
         2.0,
-        {"titin_calcium": 0.7},
+        {"titin_calcium": 0.7, "titin_hill": 0.5, "titin_rebinding": 1.0},
         tuple({"titin_stiffness": 1.0, "titin_calcium": half} for half in (0.3, 1.0, 4.0)),
     ),
     Entry(
         Name.STATIC_CALCIUM_STIFFNESS,
         "calcium_stiffness",
         2.0,
-        {"stiffness_calcium": 0.7},
+        {"stiffness_calcium": 0.7, "stiffness_hill": 0.5},
         tuple({"calcium_stiffness": 1.0, "stiffness_calcium": half} for half in (0.3, 1.0, 4.0)),
     ),
     Entry(Name.LENGTH_DEPENDENT_ACTIVATION, "calcium_per_length", 3.0, starts=({"calcium_per_length": 1.5},)),
     Entry(Name.LATTICE_SPACING, "attachment_per_length", 3.0, starts=({"attachment_per_length": 1.5},)),
-    Entry(Name.FILAMENT_OVERLAP, "overlap_per_length", 3.0, starts=({"overlap_per_length": -1.5},)),
+    Entry(
+        Name.FILAMENT_OVERLAP,
+        "overlap_per_length",
+        3.0,
+        {"overlap_edge": 0.02},
+        tuple({"overlap_per_length": -1.5, "overlap_edge": edge} for edge in (-0.06, -0.01)),
+    ),
     Entry(Name.STRAIN_RECRUITED_HEADS, "strain_recruitment", 150.0, starts=({"strain_recruitment": 60.0},)),
     Entry(
         Name.FORCIBLE_DETACHMENT,
@@ -142,7 +149,7 @@ _ROWS = (
         shape={"kse": 1.0, "kse0": 1.0},
         starts=({"kse": 0.3, "kse0": 0.1}, {"kse": 1.0, "kse0": 0.1}),
     ),
-    Entry(Name.THIN_FILAMENT_COOPERATIVITY, None, shape={"kon": 1.0, "koop": 1.0}, start_from=_of_sigmoid),
+    Entry(Name.THIN_FILAMENT_COOPERATIVITY, None, shape={"kon": 1.0, "koff": 1.0, "koop": 1.0}, start_from=_of_sigmoid),
     Entry(Name.THICK_FILAMENT_COOPERATIVITY, None, shape={"JF": 1.5}, start_from=_of_always_on),
     Entry(Name.TEMPERATURE, "warmer", 3.0, starts=({"warmer": 2.0},), reach=5.0),
     Entry(Name.PHOSPHATE, "phosphate_detachment", 5.0, starts=({"phosphate_detachment": 2.0},)),

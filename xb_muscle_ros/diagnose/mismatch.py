@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +22,26 @@ from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.trials.trial import Trial
 
 Array = npt.NDArray[np.float64]
+
+
+class Bound(NamedTuple):
+    """Held-out RMSD of fits taken as linear, on one footing, F0.
+
+    Attributes:
+        before_f0: parameters alone.
+        after_f0: the explanation.
+        flexible_f0: parameters and a discrepancy without physics, which an explanation is measured by.
+    """
+
+    before_f0: float
+    after_f0: float
+    flexible_f0: float
+
+    @property
+    def share(self) -> float | None:
+        """Of the flexible discrepancy's gain that the explanation reaches; None where that gains nothing."""
+        most = self.before_f0 - self.flexible_f0
+        return (self.before_f0 - self.after_f0) / most if most > 0.0 else None
 
 
 @dataclass(frozen=True)
@@ -78,26 +99,43 @@ class Recordings:
         """The law of what a fit left."""
         return law(self.residuals(study, linear), linear.fit, _scalings(study, linear))
 
-    def flexible_rmsd_f0(self, study: Study, linear: Linear, folds: Sequence[frozenset[str]]) -> float | None:
-        """Held-out RMSD of a flexible discrepancy, F0: the law of nothing in particular, learnt from other trials."""
+    def bound(self, study: Study, base: Linear, last: Linear, folds: Sequence[frozenset[str]]) -> Bound | None:
+        """What base, explanation and a flexible discrepancy foretell of trials left out; None without folds."""
+        found = (
+            self._foretold(study, base, folds, False),
+            self._foretold(study, last, folds, False),
+            self._foretold(study, base, folds, True),
+        )
+        before, after, flexible = found
+        return None if before is None or after is None or flexible is None else Bound(before, after, flexible)
+
+    def _foretold(self, study: Study, linear: Linear, folds: Sequence[frozenset[str]], flexible: bool) -> float | None:
+        """Held-out RMSD of a fit taken as linear, F0; None where a fold leaves nothing to learn from.
+
+        Args:
+            study: all trials.
+            linear: the fit to all of them; coordinates give way to what they would be had a fold not been fitted.
+            folds: held out together.
+            flexible: add what a discrepancy without physics learns from the other trials: the bound for a mechanism.
+        """
         found = self.residuals(study, linear)
-        scalings = _scalings(study, linear)
+        scalings = _scalings(study, linear) if flexible else {}
         squares, samples = 0.0, 0
         for fold in folds:
             held = [r.trial in fold for r in found]
+            if all(held):
+                return None
             weights = linear.fit.weights * np.repeat([0.0 if h else 1.0 for h in held], [r.time_s.size for r in found])
             without = LinearFit(linear.fit.slopes, weights, linear.fit.prior)
-            # The coordinates as they would be had these trials not been fitted, to first order.
             value = without.left(linear.residual_f0[:, None])[:, 0]
             edges = np.cumsum([0, *(r.time_s.size for r in found)])
             here = [r._replace(value_f0=value[a:b]) for r, a, b in zip(found, edges[:-1], edges[1:], strict=True)]
-            if all(held):
-                return None
-            told = flexible_fit(here, held, without, scalings).predicted_f0
-            left = [r for r, h in zip(here, held, strict=True) if h]
-            for r, prediction in zip(left, told, strict=True):
-                squares += float(np.sum((r.value_f0 - prediction) ** 2))
-                samples += r.time_s.size
+            left = [r.value_f0 for r, h in zip(here, held, strict=True) if h]
+            if flexible:
+                told = flexible_fit(here, held, without, scalings).predicted_f0
+                left = [value - prediction for value, prediction in zip(left, told, strict=True)]
+            squares += sum(float(np.sum(part**2)) for part in left)
+            samples += sum(part.size for part in left)
         return float(np.sqrt(squares / samples)) if samples else None
 
 

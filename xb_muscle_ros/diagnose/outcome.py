@@ -15,7 +15,7 @@ from xb_muscle_ros.diagnose.closure import by_distribution
 from xb_muscle_ros.diagnose.crossval import HeldOut, difference
 from xb_muscle_ros.diagnose.explained import HOW
 from xb_muscle_ros.diagnose.kernel import Law
-from xb_muscle_ros.diagnose.mismatch import Recordings, simulated
+from xb_muscle_ros.diagnose.mismatch import Bound, Recordings, simulated
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name, Verdict
 from xb_muscle_ros.diagnose.next_experiment import Proposal, scaled
 from xb_muscle_ros.diagnose.profile import Known
@@ -49,7 +49,7 @@ class Outcome:
         before, after: significance of what the base and the final explanation left.
         last: the final explanation, taken as linear.
         heldout: scores by label.
-        flexible_f0: held-out RMSD of a flexible discrepancy.
+        bound: what a flexible discrepancy foretells of trials left out, beside base and final explanation.
         law: of what the base left.
         known: the leading mechanism's parameter.
         decision: the answer.
@@ -68,7 +68,7 @@ class Outcome:
     after: Significance
     last: Linear
     heldout: Mapping[str, HeldOut]
-    flexible_f0: float | None
+    bound: Bound | None
     law: Law | None
     known: Known | None
     decision: Decision
@@ -132,7 +132,8 @@ def as_json(o: Outcome, quick: bool) -> dict[str, Any]:
         "before": _scores(o, o.search.base),
         "after": _scores(o, o.shown),
         "start": {"train_rmsd_f0": _rmsd(o, o.start_forces)},
-        "flexible_bound_rmsd_f0": o.flexible_f0,
+        "flexible_bound_rmsd_f0": o.bound.flexible_f0 if o.bound else None,
+        "linear_heldout": {"before_rmsd_f0": o.bound.before_f0, "after_rmsd_f0": o.bound.after_f0} if o.bound else None,
         "checks": [c._asdict() for c in d.checks],
         "next_experiment": None
         if o.proposal is None

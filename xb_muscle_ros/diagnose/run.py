@@ -109,7 +109,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
     folds = folds_of(study, effort.folds)
     scored = _to_score(search, effort.rivals) if detected else [search.base]
     scores = held_out(study, scored, folds, max(6, effort.most // 2), options) if folds else {}
-    flexible = recordings.flexible_rmsd_f0(study, search.linear, folds) if folds and detected else None
+    bound = recordings.bound(study, search.linear, last, folds) if folds and detected else None
     lead = _lead(search)
     interval = known(study, search.final, lead, effort.profiled, options) if lead and detected else None
     decision = decide(
@@ -120,7 +120,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
             detected=detected,
             p_value=before.overall_p,
             heldout=scores,
-            flexible_f0=flexible,
+            bound=bound,
             interval=interval.interval if interval else None,
             at_bound=interval.at_bound if interval else False,
             cleaned=_cleaned(before, after),
@@ -136,7 +136,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
         after=after,
         last=last,
         heldout=scores,
-        flexible_f0=flexible,
+        bound=bound,
         law=recordings.law(study, search.linear) if detected else None,
         known=interval,
         decision=decision,

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from xb_muscle_ros.diagnose.catalogue import CATALOGUE
 from xb_muscle_ros.diagnose.crossval import HeldOut, difference
+from xb_muscle_ros.diagnose.mismatch import Bound
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name, Verdict
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.search import Search
@@ -83,7 +84,7 @@ class Evidence:
         detected: whether the base leaves more than noise and than is of use.
         p_value: of what the base leaves.
         heldout: scores by label.
-        flexible_f0: held-out RMSD of a flexible discrepancy, or None.
+        bound: what a flexible discrepancy foretells of trials left out beside base and answer, or None.
         interval: of the leading mechanism's effect, or None where it has none.
         at_bound: whether that effect ended at a bound.
         cleaned: share of the located cells' mean square that is gone afterwards.
@@ -96,7 +97,7 @@ class Evidence:
     detected: bool
     p_value: float
     heldout: Mapping[str, HeldOut]
-    flexible_f0: float | None
+    bound: Bound | None
     interval: tuple[float, float] | None
     at_bound: bool
     cleaned: float
@@ -251,8 +252,8 @@ def _heldout_checks(e: Evidence) -> list[Check]:
             f"{100 * base.rmsd_f0:.2f} to {100 * after.rmsd_f0:.2f} % F0, {gain.delta_elpd:.1f} ± {gain.se:.1f}",
         )
     ]
-    if e.flexible_f0 is not None and e.flexible_f0 < base.rmsd_f0:
-        of_flexible = (base.rmsd_f0 - after.rmsd_f0) / (base.rmsd_f0 - e.flexible_f0)
+    of_flexible = e.bound.share if e.bound is not None else None
+    if of_flexible is not None:
         found.append(
             Check(
                 "its held-out gain is at least half of what a discrepancy without physics gets",

@@ -105,9 +105,10 @@ class Quantities:
     """What a block may ask for, by name: its parameters, the states of all blocks, inputs, and provided quantities.
 
     Names that exist in every cross-bridge model: ``calcium`` (µM), ``velocity`` (L0/s), ``length_change`` (L0),
-    ``q0 q1 q2`` (moments), ``force_xb`` (cross-bridge force, power-stroke units), ``forcibly_detached`` (R),
-    ``available_sites`` (N), ``ready_heads`` (D), ``gamma``, and ``recruitment`` (what brings super-relaxed heads into
-    play beside force; 0 unless a mechanism says otherwise).
+    ``sarcomere_change`` (L0, that of the half-sarcomeres: without the series element's), ``q0 q1 q2`` (moments),
+    ``force_xb`` (cross-bridge force, power-stroke units), ``forcibly_detached`` (R), ``available_sites`` (N),
+    ``ready_heads`` (D), ``gamma``, and ``recruitment`` (what brings super-relaxed heads into play beside force; 0
+    unless a mechanism says otherwise).
 
     ``positive``, ``divisor``, ``variance`` and ``limit`` are the places where the released parameter sets were fitted
     with smooth functions; without smoothing they are exact.

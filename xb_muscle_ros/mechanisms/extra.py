@@ -41,6 +41,14 @@ class Extra(Mechanism):
         """Force beside the contractile and the parallel element, F0."""
         return 0
 
+    def inner_force(self, q: Quantities) -> Expr:
+        """Force beside the heads within the half-sarcomeres, in series with the series element, power-stroke units."""
+        return 0
+
+    def inner_kinetics(self, q: Quantities) -> tuple[Expr, Expr]:
+        """Rate of that force at constant length, 1/s, and its stiffness per power stroke."""
+        return 0, 0
+
     def modified(self, q: Quantities) -> Mapping[str, Expr]:
         """Other values for parameters and inputs, by name; the model's blocks see these in place of their own."""
         return {}

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from xb_muscle_ros.distribution.base import Moments, Representation, Ways
 from xb_muscle_ros.distribution.gaussian import Gaussian
 from xb_muscle_ros.mechanisms.base import Quantities
-from xb_muscle_ros.mechanisms.extra import Chain, HeadMoments, Unit
+from xb_muscle_ros.mechanisms.extra import Chain, Extra, HeadMoments, Unit
 from xb_muscle_ros.mechanisms.ops import Expr
 from xb_muscle_ros.models.composition import INPUTS, Composition, Equations, other_states
 
@@ -85,6 +85,7 @@ def rates(model: Composition, q: Quantities) -> Parts:
     The order is fixed by who needs what: force and sites before heads, heads before fluxes, fluxes before velocity.
     """
     q = q.for_block("composition", recruitment=0)
+    q = q.for_block("composition", sarcomere_change=_sarcomere_change(model, q))
     own = _heads(model, model.representation, _modified(model, q))
     # What mechanisms changed for the model's blocks they do not see themselves.
     shown = {name: getattr(own.q, name) for name in ("force_xb", "available_sites", "ready_heads", "forcibly_detached")}
@@ -98,6 +99,8 @@ def rates(model: Composition, q: Quantities) -> Parts:
         other = _heads(model, Gaussian(), _modified(model, q.for_block("composition", **values)))
         chain = model.in_series.chain(mine, own.unit, other.unit)
         unit = Unit(chain.force, chain.force_rate, chain.stiffness)
+    for extra in model.extras:
+        unit = _with_inner(unit, extra, q.for_block(extra.name))
     q = q.for_block(
         model.series.name, force_xb=unit.force, kinetic_force_rate=unit.force_rate, stiffness_xb=unit.stiffness
     )
@@ -110,6 +113,11 @@ def rates(model: Composition, q: Quantities) -> Parts:
     for extra in model.extras:
         others.update(extra.derivatives(q.for_block(extra.name)))
     return Parts(own.kinetics, others, own.ways, own_velocity, q)
+
+
+def _with_inner(unit: Unit, extra: Extra, q: Quantities) -> Unit:
+    rate, stiffness = extra.inner_kinetics(q)
+    return Unit(unit.force + extra.inner_force(q), unit.force_rate + rate, unit.stiffness + stiffness)
 
 
 class _Heads(NamedTuple):
@@ -129,14 +137,30 @@ def _modified(model: Composition, q: Quantities) -> Quantities:
     return q
 
 
+def _sarcomere_change(model: Composition, q: Quantities) -> Expr:
+    """Length change of the half-sarcomeres, L0: the fibre's without that of the series element.
+
+    Of a chain of two, the force of the model's own heads counts.
+    """
+    force = _borne(model, q, _moments(q)) + sum(extra.inner_force(q.for_block(extra.name)) for extra in model.extras)
+    extension = model.series.extension(q.for_block(model.series.name, force_xb=force))
+    return q.length_change - extension / q.gamma
+
+
+def _borne(model: Composition, q: Quantities, m: HeadMoments) -> Expr:
+    """What heads bear, power-stroke units; rates may stand for heads."""
+    return m.m0 + m.m1 + sum(extra.head_force(q.for_block(extra.name), m) for extra in model.extras)
+
+
+def _moments(q: Quantities) -> HeadMoments:
+    return HeadMoments(q.q0, q.q1, q.q2)
+
+
 def _heads(model: Composition, representation: Representation, q: Quantities) -> _Heads:
     """Kinetics of one half-sarcomere, from its moments and states."""
     thin, thick, detach = model.thin_filament, model.thick_filament, model.detachment
 
-    def borne(m: HeadMoments) -> Expr:
-        return m.m0 + m.m1 + sum(extra.head_force(q.for_block(extra.name), m) for extra in model.extras)
-
-    q = q.for_block(detach.name, force_xb=borne(HeadMoments(q.q0, q.q1, q.q2)))
+    q = q.for_block(detach.name, force_xb=_borne(model, q, _moments(q)))
     q = q.for_block(thin.name, forcibly_detached=detach.forcibly_detached(q))
     sites = thin.available_sites(q)
     for extra in model.extras:
@@ -159,8 +183,8 @@ def _heads(model: Composition, representation: Representation, q: Quantities) ->
     net = kinetics.m0 + torn - back
     others.update(thick.derivatives(q.for_block(thick.name, attachment_rate_net=net)))
     # Strain grows by one power stroke with every power stroke of movement: Q1 by Q0, Q2 by 2 Q1.
-    stiffness = borne(HeadMoments(0, q.q0, 2 * q.q1))
-    unit = Unit(q.force_xb, borne(HeadMoments(*kinetics)), stiffness)
+    stiffness = _borne(model, q, HeadMoments(0, q.q0, 2 * q.q1))
+    unit = Unit(q.force_xb, _borne(model, q, HeadMoments(*kinetics)), stiffness)
     return _Heads(q, kinetics, ways, others, unit)
 
 

@@ -50,7 +50,10 @@ class Hill(Model):
 
         names = [*(s.name for s in self.states), *(i.name for i in INPUTS), *(p.name for p in self.parameters)]
         symbols = {name: sympy.Symbol(name, real=True) for name in names}
-        plain = q = Quantities(symbols, self.name, None)
+        extension = sum(symbols[state.name] for state in self.series.length_states)
+        plain = q = Quantities(
+            {**symbols, "sarcomere_change": symbols["length_change"] - extension / symbols["gamma"]}, self.name, None
+        )
         for extra in self.extras:
             q = q.for_block(self.name, **extra.modified(q.for_block(extra.name)))
         level = self.activation.level(q.for_block(self.activation.name))

@@ -12,14 +12,22 @@ OVERLAP = Parameter(
     "relative change of reachable sites with length: positive on the ascending limb, negative on the descending",
     -50.0, 50.0, 0.0, "Gordon, Huxley and Julian 1966; this package",
 )  # fmt: skip
+EDGE = Parameter(
+    "overlap_edge", "L0", "length change of half-sarcomeres up to which overlap stays as it is (the plateau's edge)",
+    -1.0, 1.0, -1.0, "Gordon, Huxley and Julian 1966; this package",
+)  # fmt: skip
 
 
 class FilamentOverlap(Extra):
-    """N exp(alpha ΔL) in place of the available sites N: a limb of the force-length relation near rest length."""
+    """N exp(alpha ((ΔS - edge)+ - (-edge)+)) in place of the available sites N: plateau and limb near rest length.
+
+    ΔS is the half-sarcomeres' length change: a taut series spring leaves them shorter than the fibre.
+    """
 
     name = "filament_overlap"
-    parameters = (OVERLAP,)
+    parameters = (OVERLAP, EDGE)
 
     def overlap(self, q: Quantities) -> Expr:
         """See the class."""
-        return ops.exp(q.overlap_per_length * q.length_change)
+        beyond = q.positive(q.sarcomere_change - q.overlap_edge) - q.positive(-q.overlap_edge)
+        return ops.exp(q.overlap_per_length * beyond)
