@@ -11,7 +11,7 @@ import pytest
 
 from xb_muscle_ros.diagnose.cells import Residual
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise_model import Window
+from xb_muscle_ros.diagnose.noise.windows import Window
 from xb_muscle_ros.replay.made import coloured_noise
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 

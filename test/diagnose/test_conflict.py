@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.diagnose.conflict import conflicts
-from xb_muscle_ros.diagnose.noise_model import noise_model
+from xb_muscle_ros.diagnose.noise.estimate import noise_model
 from xb_muscle_ros.errors import UserError
 
 GROUPS = ("high", "high", "high", "low", "low")

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.cells import Residual
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise_model import NoiseModel
+from xb_muscle_ros.diagnose.noise.model import NoiseModel
 from xb_muscle_ros.diagnose.significance import null_residuals, sharpened
 from xb_muscle_ros.errors import UserError
 

@@ -12,7 +12,9 @@ from xb_muscle_ros.diagnose.cells import Residual
 from xb_muscle_ros.diagnose.flexible import flexible_fit
 from xb_muscle_ros.diagnose.kernel import Law, law
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise_model import NoiseModel, isometric_window, noise_model
+from xb_muscle_ros.diagnose.noise.estimate import noise_model
+from xb_muscle_ros.diagnose.noise.model import NoiseModel
+from xb_muscle_ros.diagnose.noise.windows import isometric_window
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.screen import Linear
 from xb_muscle_ros.diagnose.significance import Significance, significance
