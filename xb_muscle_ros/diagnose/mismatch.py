@@ -12,9 +12,8 @@ from xb_muscle_ros.diagnose.cells import Residual
 from xb_muscle_ros.diagnose.flexible import flexible_fit
 from xb_muscle_ros.diagnose.kernel import Law, law
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise.estimate import noise_model
 from xb_muscle_ros.diagnose.noise.model import NoiseModel
-from xb_muscle_ros.diagnose.noise.windows import isometric_window
+from xb_muscle_ros.diagnose.noise.trials import noise_of
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.screen import Linear
 from xb_muscle_ros.diagnose.significance import Significance, significance
@@ -48,7 +47,7 @@ class Recordings:
         Raises:
             UserError: no trial holds still for long enough.
         """
-        return Recordings(tuple(trials), noise_model([isometric_window(t) for t in trials]), draws, seed)
+        return Recordings(tuple(trials), noise_of(trials), draws, seed)
 
     def residuals(self, study: Study, linear: Linear) -> list[Residual]:
         """What a fit left of every trial."""

@@ -192,6 +192,8 @@ def _trials(o: Outcome) -> list[dict[str, Any]]:
             "pca": trial.facts.pca,
             "phases": [{"name": p.name, "start_s": p.start_s, "end_s": p.end_s} for p in trial.facts.phases],
             "noise_sd_f0": noise[k].sd_f0,
+            "noise_from": noise[k].source.value,
+            "noise_samples": noise[k].samples,
         }
         for key, forces in (("before", base), ("after", shown)):
             row[f"{key}_rmsd_f0"] = float(np.sqrt(np.mean((fitted.measured_f0 - forces[k]) ** 2)))

@@ -1,4 +1,4 @@
-"""What windows tell of partial correlations: the most probable ones, and others that stay possible."""
+"""What parts of recordings tell of partial correlations: the most probable ones, and others that stay possible."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ _REACH, _PRIOR_SD = 3.0, 0.7
 PRIOR_MEAN = np.array([1.8] + [0.0] * (ORDER - 1))
 # Models that are tried for those from which draws come, and how much wider than a normal posterior they lie.
 _TRIED, _WIDER = 480, 1.5
-# Newton steps at most; most windows take five.
+# Other trials' parts bear on a trial's colour as if they had this many samples together at most: colour at pCa 9 is not
+# that at pCa 4.5.
+_OTHERS = 100
+# Newton steps at most; most studies take five.
 _STEPS = 25
 
 
@@ -41,31 +44,49 @@ def most_probable(parts: Sequence[Part], shares: Sequence[float], start: Array) 
     return z
 
 
-def possible(parts: Sequence[Part], shares: Sequence[float], z: Array) -> Array:
-    """Partial correlations that windows leave possible, from little noise to much, shape (members, order).
+def possible(parts: Sequence[Part], shares: Sequence[float], z: Array, own: int) -> Array:
+    """Partial correlations that parts leave possible, from little noise to much, shape (members, order).
 
     Drawn around the most probable and resampled, because persistent noise stays possible for longer than a normal
     distribution would have it.
+
+    Args:
+        parts: those of the trial first.
+        shares: what each one's likelihood counts.
+        z: the most probable, shape (order,).
+        own: how many are the trial's.
     """
     normal = _WIDER * np.random.default_rng(0).standard_normal((_TRIED, ORDER))
     tried = z + normal @ _spread(parts, shares, z).T
     log = -_costs(parts, shares, np.clip(tried, -_REACH, _REACH)) + 0.5 * np.sum(normal**2, axis=1) / _WIDER**2
     weights = np.where(np.all(np.abs(tried) <= _REACH, axis=1), np.exp(log - log.max()), 0.0)
     found = regressions(np.clip(tried, -_REACH, _REACH))
-    # Sorted before drawing at even steps, so that all of the distribution is met.
-    order = np.argsort(squares(parts[:1], found)[0][:, 0] * found.sizes[:, 0])
-    steps = (np.arange(MEMBERS) + 0.5) / MEMBERS
-    total = np.cumsum(weights[order]) / max(float(weights.sum()), 1e-300)
-    picked = order[np.minimum(np.searchsorted(total, steps), _TRIED - 1)]
-    possible: Array = tried[picked]
+    possible: Array = tried[spread_over(np.sum(squares(parts[:own], found)[0], axis=1) * found.sizes[:, 0], weights)]
     return possible
 
 
+def spread_over(sizes: Array, weights: Array) -> npt.NDArray[np.intp]:
+    """Which models of noise stand for all that were weighed, from little noise to much, shape (members,).
+
+    Sorted before drawing at even steps, so that all of the distribution is met.
+    """
+    order = np.argsort(sizes)
+    steps = (np.arange(MEMBERS) + 0.5) / MEMBERS
+    total = np.cumsum(weights[order]) / max(float(weights.sum()), 1e-300)
+    picked: npt.NDArray[np.intp] = order[np.minimum(np.searchsorted(total, steps), sizes.size - 1)]
+    return picked
+
+
+def share_of_others(freedom: float) -> float:
+    """What each of the other trials' parts counts beside a trial's own, of so many degrees of freedom together."""
+    return min(1.0, _OTHERS / max(freedom, 1.0))
+
+
 def _costs(parts: Sequence[Part], shares: Sequence[float], z: Array) -> Array:
-    """Minus the logarithm of the restricted likelihood of windows, each with its own size of noise, and of the prior.
+    """Minus the logarithm of the restricted likelihood of parts, each with its own size of noise, and of the prior.
 
     Args:
-        parts: windows.
+        parts: of all trials.
         shares: what each one's likelihood counts.
         z: partial correlations, inverse hyperbolic tangents, shape (many, order).
 

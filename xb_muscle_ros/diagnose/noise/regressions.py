@@ -1,7 +1,7 @@
-"""Autoregressions of force in windows, and their restricted likelihood.
+"""Autoregressions of force in evenly sampled parts of a recording, and their restricted likelihood.
 
-It leaves out what a drift of the window could have done, and is, other than sample correlations, hardly biased when a
-window of 80 samples holds a few independent ones (Cooper and Thompson, Biometrika 64 (1977) 625-628).
+It leaves out what a drift of the part could have done, and is, other than sample correlations, hardly biased when a
+part of 80 samples holds a few independent ones (Cooper and Thompson, Biometrika 64 (1977) 625-628).
 """
 
 from __future__ import annotations
@@ -12,45 +12,48 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.noise.windows import Window
+from xb_muscle_ros.diagnose.noise.model import LEAST_SD_F0
 
 Array = npt.NDArray[np.float64]
 
 ORDER = 6
-# From here on a window's drift may be curved.
-_CURVED = 200
-# Far finer than any recording; also where no noise was added at all.
-LEAST_SD_F0 = 1e-5
 
 
 class Part:
-    """One window, and what its likelihood needs of it.
+    """An evenly sampled part of a trial, and what its likelihood needs of it.
 
     Attributes:
         step_s: between samples, s.
         silent: whether there is nothing left beside the drift.
+        samples: how many.
         freedom: samples less what the drift takes.
-        empty: ones on the diagonal for columns of drift that there are not, shape (3, 3).
-        begin: first samples of force and drift, shape (4, order).
-        products: of all columns at all lags, shape ((order + 1)², 4, 4).
+        empty: ones on the diagonal for columns of drift that there are not, shape (width, width).
+        begin: first samples of force and drift, shape (1 + width, order).
+        products: of all columns at all lags, shape ((order + 1)², (1 + width)²).
     """
 
-    def __init__(self, window: Window) -> None:
-        self.step_s = window.step_s
-        n = window.force_f0.size
-        at = np.linspace(-1.0, 1.0, n)
-        drift, _ = np.linalg.qr(np.vander(at, 3 if n >= _CURVED else 2))
-        left = window.force_f0 - drift @ (drift.T @ window.force_f0)
+    def __init__(self, step_s: float, force_f0: Array, drift: Array, width: int) -> None:
+        """Prepare a part.
+
+        Args:
+            step_s: between samples, s.
+            force_f0: shape (n,), F0.
+            drift: what force may do beside noise, orthonormal, shape (n, columns).
+            width: columns that drift has at most, in all parts that are looked at together.
+        """
+        self.step_s = step_s
+        n, count = drift.shape
+        left = force_f0 - drift @ (drift.T @ force_f0)
         self.silent = float(np.sqrt(np.mean(left**2))) < LEAST_SD_F0
-        self.freedom = float(n - drift.shape[1])
-        # Force first, then three columns of drift, the last of them perhaps empty: all are whitened together.
-        columns = np.zeros((4, n))
-        columns[0], columns[1 : 1 + drift.shape[1]] = left, drift.T
-        self.empty = np.diag([0.0, 0.0, 3.0 - drift.shape[1]])
+        self.samples, self.freedom = n, float(n - count)
+        # Force first, then the columns of drift, the last of them perhaps empty: all are whitened together.
+        columns = np.zeros((1 + width, n))
+        columns[0], columns[1 : 1 + count] = left, drift.T
+        self.empty = np.diag(np.where(np.arange(width) < count, 0.0, 1.0))
         self.begin = columns[:, :ORDER]
-        # Products of all columns at all lags: what is new in the samples is a sum over them, however long the window.
+        # Products of all columns at all lags: what is new in the samples is a sum over them, however long the part.
         lagged = np.stack([columns[:, ORDER - k : n - k] for k in range(ORDER + 1)])
-        self.products = np.einsum("ict,jdt->ijcd", lagged, lagged, optimize=True).reshape((ORDER + 1) ** 2, 4, 4)
+        self.products = np.einsum("ict,jdt->ijcd", lagged, lagged, optimize=True).reshape((ORDER + 1) ** 2, -1)
 
 
 class Regressions(NamedTuple):
@@ -82,19 +85,30 @@ def regressions(z: Array) -> Regressions:
 
 def squares(parts: Sequence[Part], of: Regressions) -> tuple[Array, Array]:
     """Squares of what is new in the samples, drift taken out, F0², and log-determinants, shape (many, parts)."""
+    width = parts[0].empty.shape[0]
     last = of.filters[:, -1, ::-1]
     pairs = (last[:, :, None] * last[:, None, :]).reshape(last.shape[0], -1)
-    products = np.stack([p.products.reshape(-1, 16) for p in parts])
-    gram = np.swapaxes(pairs @ products, 0, 1).reshape(-1, len(parts), 4, 4)
+    products = np.stack([p.products for p in parts])
+    gram = np.swapaxes(pairs @ products, 0, 1).reshape(-1, len(parts), 1 + width, 1 + width)
     rows = of.filters[:, :ORDER, :ORDER] / np.sqrt(of.sizes[:, :ORDER, None])
     begin = np.stack([p.begin for p in parts]) @ np.swapaxes(rows, -1, -2)[:, None]
     gram = gram + begin @ np.swapaxes(begin, -1, -2)
+    left, log_drift = restricted(gram, np.stack([p.empty for p in parts]))
+    return left, np.sum(np.log(of.sizes), axis=1)[:, None] + log_drift
+
+
+def restricted(gram: Array, empty: Array) -> tuple[Array, Array]:
+    """Squares of whitened force that are left beside whitened drift, and the log-determinant of drift's own.
+
+    Args:
+        gram: products of force, first, and drift, shape (..., 1 + width, 1 + width).
+        empty: ones on the diagonal for columns of drift that there are not, shape (..., width, width).
+    """
     drift, across = gram[..., 1:, 1:], gram[..., 1:, :1]
     trace = np.trace(drift, axis1=-1, axis2=-2)[..., None, None]
-    drift = drift + 1e-12 * trace * np.eye(3) + np.stack([p.empty for p in parts])
+    drift = drift + 1e-12 * trace * np.eye(drift.shape[-1]) + empty
     left = gram[..., 0, 0] - np.sum(across * np.linalg.solve(drift, across), axis=(-1, -2))
-    log = np.sum(np.log(of.sizes), axis=1)[:, None] + np.linalg.slogdet(drift)[1]
-    return np.maximum(left, 1e-300), log
+    return np.maximum(left, 1e-300), np.linalg.slogdet(drift)[1]
 
 
 def correlation(filters: Array) -> Array:

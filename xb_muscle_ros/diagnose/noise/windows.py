@@ -15,7 +15,7 @@ from xb_muscle_ros.trials.trial import Trial
 Array = npt.NDArray[np.float64]
 
 # A window has at least this many samples; more than the most tell no more about noise, only about slow force.
-LEAST, _MOST = 20, 1000
+LEAST, MOST = 20, 1000
 # Calcium that moves by less than this share of its range from sample to sample stays as it is.
 _CALM = 1e-4
 
@@ -48,13 +48,13 @@ def isometric_window(trial: Trial) -> Window:
             begin_s = longest.end_s - (longest.end_s - longest.start_s) / 3.0
             begin, end = np.searchsorted(time_s, [begin_s, longest.end_s])
             inside = slice(int(begin), int(end))
-    inside = _same_calcium(trial, inside)
-    found = slice(max(inside.start, inside.stop - _MOST), inside.stop)
+    inside = same_calcium(trial, inside)
+    found = slice(max(inside.start, inside.stop - MOST), inside.stop)
     step_s = float(np.median(np.diff(time_s[found]))) if found.stop - found.start > 1 else math.nan
     return Window(trial.facts.trial, step_s, np.asarray(trial.measured_f0[found]))
 
 
-def _same_calcium(trial: Trial, inside: slice) -> slice:
+def same_calcium(trial: Trial, inside: slice) -> slice:
     """The longest part of a window in which calcium stays as it is; after a change of calcium, without its first third.
 
     A stimulated muscle's force comes and goes while its length is held; that is no noise.

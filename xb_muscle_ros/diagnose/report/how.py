@@ -34,7 +34,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "start_rmsd": Kind(
             "Force RMSD of the fibre file", "Force RMSD of the model with the values of the fibre file as it was given."
         ),
-        "noise": Kind("Noise", "Standard deviation of the measured force where nothing happens to the fibre."),
+        "noise": Kind("Noise", "Standard deviation of the measured force beside all that the fibre does."),
         "p_value": Kind(
             "Chance",
             "Share of simulated repeats of the recordings, made by the fitted model with noise like the measured, in "
