@@ -256,12 +256,16 @@ def diagnosis_of(study: Study, verdict: str) -> dict[str, Any]:
         "confidence": {"ambiguous": 0.55, "unexplained": 0.2, "none": 0.9}.get(verdict, 0.94),
         "trials": [
             {
-                "trial": trial.facts.trial, "pca": trial.facts.pca, "noise_sd_f0": NOISE_SD_F0,
+                "trial": trial.facts.trial, "pca": trial.facts.pca, "noise_sd_f0": NOISE_SD_F0, "noise_from": "curve",
                 "phases": [{"name": p.name, "start_s": p.start_s, "end_s": p.end_s} for p in trial.facts.phases],
                 "before_rmsd_f0": rms(study.left[i]), "after_rmsd_f0": rms(after[i]),
                 "heldout_before_f0": rms(study.left[i]), "heldout_after_f0": rms(heldout[i]),
             }
             for i, trial in enumerate(study.trials)
+        ],
+        "conflicts": [
+            {"between": "solutions", "parts": 2, "gone": 0.97, "furthest": 1.2},
+            {"between": "trials", "parts": len(study.trials), "gone": 0.98, "furthest": 1.1},
         ],
         "mismatch": mismatches(study, shown), "map": shown, "map_after": table_of(study, after),
         "kernel": None if quiet else study.kernel(),
@@ -411,6 +415,15 @@ def test_numbers_of_the_diagnosis_stand_in_links_only(tmp_path: Path) -> None:
     # What the tool tells of its computing stands in place of the definition, and what nothing links to stands as well.
     assert all(text in page.outside for text in facts["how"].values())
     assert "how-something_else" in page.ids
+
+
+def test_conflicts_and_the_source_of_noise_are_told(tmp_path: Path) -> None:
+    study = study_of("physics")
+    text = write_report(save(tmp_path, study, diagnosis_of(study, "physics"))).read_text(encoding="utf-8")
+    assert "The solutions contradict each other" in text
+    assert re.search(r'solution \(pCa\)</td><td class="r">2</td><td class="r"><a [^>]*>97 %</a>', text)
+    assert re.search(r">0\.10</a>\*</td>", text)
+    assert "* Noise: what smooth curves leave of force" in text
 
 
 def test_a_summary_of_the_users_own_stays_as_it_is(tmp_path: Path) -> None:

@@ -78,8 +78,8 @@ def test_concealed_drag_is_found_and_modelled(drag: tuple[Path, dict[str, Any]])
 def test_the_json_has_what_users_build_on(drag: tuple[Path, dict[str, Any]]) -> None:
     _, found = drag
     wanted = {
-        "verdict", "answer", "family", "p_value", "confidence", "mismatch", "kernel", "candidates", "before", "after",
-        "flexible_bound_rmsd_f0", "next_experiment", "augmented_fiber", "summary", "how",
+        "verdict", "answer", "family", "p_value", "confidence", "mismatch", "conflicts", "kernel", "candidates",
+        "before", "after", "flexible_bound_rmsd_f0", "next_experiment", "augmented_fiber", "summary", "how",
     }  # fmt: skip
     assert wanted <= set(found)
     assert {"trial", "phase", "start_s", "end_s", "size_f0", "sign", "p_value"} <= set(found["mismatch"][0])
@@ -89,6 +89,8 @@ def test_the_json_has_what_users_build_on(drag: tuple[Path, dict[str, Any]]) -> 
     )
     assert {"noise_sd_f0", "noise_from", "noise_samples"} <= set(found["trials"][0])
     assert found["trials"][0]["noise_from"] == "window"
+    # One trial of each solution.
+    assert [(row["between"], row["parts"]) for row in found["conflicts"]] == [("trials", 4)]
     assert Verdict(found["verdict"])
     assert all(Name(n) for n in found["answer"])
 

@@ -38,6 +38,10 @@ HOW: Mapping[str, str] = MappingProxyType(
             "From the same bootstrap, place by place (step-down maxima), so that all places can be looked at together."
         ),
         "map": "Residual of every phase of every trial; long pauses are split into their first 0.1 s and the rest.",
+        "conflicts": (
+            "Each part fitted by itself from where the fit of all ended, to first order and with the same priors: what "
+            "that takes off the mean square, noise taken off both."
+        ),
         "confidence": (
             "Weight of the answer among everything that was fitted in its place, from how far each one is from "
             "the data (a likelihood with two independent differences in each trial), times the share of the "

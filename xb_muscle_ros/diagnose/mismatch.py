@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.cells import Residual
+from xb_muscle_ros.diagnose.conflict import Conflict, conflicts
 from xb_muscle_ros.diagnose.flexible import flexible_fit
 from xb_muscle_ros.diagnose.kernel import Law, law
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
@@ -74,6 +75,10 @@ class Recordings:
     def usual_noise_f0(self) -> float:
         """Median over trials of the noise's standard deviation, F0: one trial's slow creep is not everybody's noise."""
         return float(np.median([noise.sd_f0 for noise in self.noise.trials]))
+
+    def conflicts(self, study: Study, linear: Linear) -> list[Conflict]:
+        """Whether parts of the study want parameters that conflict."""
+        return conflicts(self.residuals(study, linear), linear.fit, self.noise)
 
     def law(self, study: Study, linear: Linear) -> Law | None:
         """The law of what a fit left."""

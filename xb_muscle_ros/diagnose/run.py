@@ -16,7 +16,8 @@ from xb_muscle_ros.diagnose.names import MECHANISMS, Name, Verdict
 from xb_muscle_ros.diagnose.next_experiment import Proposal, propose
 from xb_muscle_ros.diagnose.noise.model import Source
 from xb_muscle_ros.diagnose.noise.trials import ENOUGH
-from xb_muscle_ros.diagnose.outcome import Outcome, as_json, write
+from xb_muscle_ros.diagnose.outcome import Outcome, write
+from xb_muscle_ros.diagnose.plain import as_json
 from xb_muscle_ros.diagnose.profile import known
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.screen import Linear
@@ -139,6 +140,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
         last=last,
         heldout=scores,
         flexible_f0=flexible,
+        conflicts=tuple(recordings.conflicts(study, search.linear)) if detected else (),
         law=recordings.law(study, search.linear) if detected else None,
         known=interval,
         decision=decision,

@@ -22,6 +22,7 @@ _LISTS: Mapping[str, tuple[str, ...]] = {
         "heldout_before_f0", "heldout_after_f0",
     ),
     "mismatch": ("trial", "phase", "start_s", "end_s", "size_f0", "mean_f0", "sign", "p_value"),
+    "conflicts": ("between", "parts", "gone", "furthest"),
     "nuisances": ("name", "group", "value", "sd", "prior_sd", "unit"),
     "base_parameters": ("name", "start", "fitted", "unit"),
     "candidates": (

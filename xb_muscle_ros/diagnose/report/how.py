@@ -49,6 +49,10 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
             "Chance that any of the places looked at shows as much: corrected for looking at many.",
         ),
         "map": Kind("Cells of the map", "Mean and root mean square of measured minus modelled force in the phase."),
+        "conflicts": Kind(
+            "Own parameters for parts of the study",
+            "Share of the mismatch's mean square that is gone if each part has parameters of its own.",
+        ),
         "confidence": Kind(
             "Confidence",
             "Weight of the answer among all candidates compared, from how well each predicts trials left out.",

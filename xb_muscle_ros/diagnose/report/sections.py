@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from xb_muscle_ros.diagnose.report.conflicts import conflicts
 from xb_muscle_ros.diagnose.report.markup import NOTHING, Markup, escaped, named, prose
 from xb_muscle_ros.diagnose.sentences import LAW, noise_from
 from xb_muscle_ros.diagnose.words import SCALES, digits, human, percent, phase_words, quantity
@@ -40,7 +41,7 @@ def where(page: Markup, written: Written) -> str:
         + (f" {more} smaller ones are in <code>diagnosis.json</code>." if more else "")
     )
     head = ["Phase", "Trial", "pCa", "From–to (s)", "Size (% F<sub>0</sub>)", "Mean (% F<sub>0</sub>)", "p"]
-    return f"{_map(page, facts)}\n{page.table(caption, head, rows, words=2)}"
+    return f"{_map(page, facts)}\n{page.table(caption, head, rows, words=2)}\n{conflicts(page, facts)}"
 
 
 def _map(page: Markup, facts: Facts) -> str:
