@@ -98,7 +98,7 @@ def kernel(page: Markup, written: Written) -> str:
         )
     words = []
     if found["time_constant_s"] is not None:
-        number = page.number(f"{1e3 * found['time_constant_s']:.3g} ms", "kernel")
+        number = page.number(quantity(1e3 * found["time_constant_s"], "ms"), "kernel")
         words.append(f"Memory of the speed of length change that describes it best: time constant {number}.")
     if found["scales_with"] in SCALES:
         words.append(f"What is left {SCALES[found['scales_with']]}.")
