@@ -25,7 +25,8 @@ from recorded_page import write_page
 
 from xb_muscle_ros.diagnose.closure import by_distribution, closure_error
 from xb_muscle_ros.diagnose.mismatch import simulated
-from xb_muscle_ros.diagnose.outcome import Outcome, as_json, write
+from xb_muscle_ros.diagnose.outcome import Outcome, write
+from xb_muscle_ros.diagnose.plain import as_json
 from xb_muscle_ros.diagnose.refit import Fit, heldout_force
 from xb_muscle_ros.diagnose.run import diagnose
 from xb_muscle_ros.diagnose.search import QUICK, Effort, penalised

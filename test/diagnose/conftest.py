@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,9 @@ import pytest
 
 from xb_muscle_ros.diagnose.cells import Residual
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise_model import Window
+from xb_muscle_ros.diagnose.noise.model import NoiseModel
+from xb_muscle_ros.diagnose.noise.trials import by_windows
+from xb_muscle_ros.diagnose.noise.windows import Window
 from xb_muscle_ros.replay.made import coloured_noise
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 
@@ -90,3 +93,13 @@ def study() -> Study:
 def long_study() -> Study:
     """The same with half a second of recovery."""
     return make_study(PCAS, 8, 0, 0.5)
+
+
+def _model_of(windows: Sequence[Window]) -> NoiseModel:
+    return NoiseModel(tuple(by_windows(windows).values()))
+
+
+@pytest.fixture(scope="session")
+def model_of() -> Callable[[Sequence[Window]], NoiseModel]:
+    """Makes the noise of a study of its windows."""
+    return _model_of

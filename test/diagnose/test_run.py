@@ -36,9 +36,16 @@ def truth(model: str = "3state_coop", **values: float) -> Fibre:
     return replace(given, values=MappingProxyType({**given.values, **scaled}))
 
 
-def study(fibre: Fibre, pcas: tuple[float, ...] = (4.5, 6.0, 6.2, 9.0), **faults: float) -> list[Trial]:
+PROTOCOL = StretchShortenStretch(0.0383, 0.1, lead_s=0.15, hold_s=0.15)
+
+
+def study(
+    fibre: Fibre,
+    pcas: tuple[float, ...] = (4.5, 6.0, 6.2, 9.0),
+    protocol: StretchShortenStretch = PROTOCOL,
+    **faults: float,
+) -> list[Trial]:
     random, muscle = np.random.default_rng(3), Muscle(fibre)
-    protocol = StretchShortenStretch(0.0383, 0.1, lead_s=0.15, hold_s=0.15)
     return [made(muscle, protocol.trial(FIBRE, pca), random, 7e-4, **faults) for pca in pcas]
 
 
@@ -71,8 +78,8 @@ def test_concealed_drag_is_found_and_modelled(drag: tuple[Path, dict[str, Any]])
 def test_the_json_has_what_users_build_on(drag: tuple[Path, dict[str, Any]]) -> None:
     _, found = drag
     wanted = {
-        "verdict", "answer", "family", "p_value", "confidence", "mismatch", "kernel", "candidates", "before", "after",
-        "flexible_bound_rmsd_f0", "next_experiment", "augmented_fiber", "summary", "how",
+        "verdict", "answer", "family", "p_value", "confidence", "mismatch", "conflicts", "kernel", "candidates",
+        "before", "after", "flexible_bound_rmsd_f0", "next_experiment", "augmented_fiber", "summary", "how",
     }  # fmt: skip
     assert wanted <= set(found)
     assert {"trial", "phase", "start_s", "end_s", "size_f0", "sign", "p_value"} <= set(found["mismatch"][0])
@@ -80,6 +87,10 @@ def test_the_json_has_what_users_build_on(drag: tuple[Path, dict[str, Any]]) -> 
     assert {"name", "kind", "parameters", "interval", "train_rmsd_f0", "heldout_rmsd_f0", "delta_elpd", "se"} <= set(
         row
     )
+    assert {"noise_sd_f0", "noise_from", "noise_samples"} <= set(found["trials"][0])
+    assert found["trials"][0]["noise_from"] == "window"
+    # One trial of each solution.
+    assert [(row["between"], row["parts"]) for row in found["conflicts"]] == [("trials", 4)]
     assert Verdict(found["verdict"])
     assert all(Name(n) for n in found["answer"])
 
@@ -111,6 +122,18 @@ def test_a_second_run_takes_what_the_first_one_kept(drag: tuple[Path, dict[str, 
     folder, found = drag
     again = diagnose_bags([folder / "bags"], FIBRE, folder / "out", quick=True, report=False)
     assert {**again, "seconds": 0.0} == {**found, "seconds": 0.0}
+
+
+def test_drag_is_found_where_nothing_holds_still_for_long(tmp_path: Path) -> None:
+    """Pauses of 10 and 40 ms: noise is taken from what smooth curves leave, and the user is told."""
+    protocol = StretchShortenStretch(0.0383, 0.01, lead_s=0.01, hold_s=0.04)
+    trials = study(truth("3state_coop+viscous_drag", drag=0.04), (4.5, 6.2, 9.0), protocol)
+    found = diagnose_bags([write(tmp_path / "bags", trials)], FIBRE, tmp_path / "out", quick=True, report=False)
+    assert found["answer"][:1] == ["viscous_drag"]
+    assert [row["noise_from"] for row in found["trials"]] == ["curve"] * 3
+    assert all(row["noise_samples"] >= 20 and 3e-4 < row["noise_sd_f0"] < 2e-3 for row in found["trials"])
+    assert any("60 evenly spaced samples of force or more while nothing moves" in line for line in found["missing"])
+    assert ", by what smooth curves leave of force. " in found["summary"]
 
 
 def test_other_parameters_are_no_physics(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 
 from xb_muscle_ros.diagnose.cells import Residual, cut, rms
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise_model import NoiseModel, Window, noise_model
+from xb_muscle_ros.diagnose.noise.model import NoiseModel
+from xb_muscle_ros.diagnose.noise.windows import Window
 from xb_muscle_ros.diagnose.significance import family_wise, null_residuals, significance, step_down
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.replay.made import coloured_noise
@@ -22,9 +23,9 @@ Array = npt.NDArray[np.float64]
 
 
 @pytest.fixture(scope="module")
-def known(study: Any) -> NoiseModel:
+def known(study: Any, model_of: Any) -> NoiseModel:
     """Noise from windows so long that it is known."""
-    return noise_model([Window(w.trial, w.step_s, _long(i)) for i, w in enumerate(study.windows(study.noise(_rng(0))))])
+    return model_of([Window(w.trial, w.step_s, _long(i)) for i, w in enumerate(study.windows(study.noise(_rng(0))))])
 
 
 def _rng(seed: int) -> np.random.Generator:
@@ -58,12 +59,12 @@ def test_false_alarms_on_noise_that_was_fitted(study: Any, known: NoiseModel) ->
     assert 50 <= np.count_nonzero(p <= 0.5) <= 130
 
 
-def test_false_alarms_where_windows_are_short(study: Any) -> None:
+def test_false_alarms_where_windows_are_short(study: Any, model_of: Any) -> None:
     """Noise known from 85 samples a trial only, and more persistent than most."""
     p = []
     for k in range(16):
         noise = study.noise(_rng(k), memory=0.97)
-        found = significance(study.after(noise), study.fit, noise_model(study.windows(noise)), draws=60, seed=k)
+        found = significance(study.after(noise), study.fit, model_of(study.windows(noise)), draws=60, seed=k)
         assert not found.detected()
         p.append(found.overall_p)
     # 4 and more of 16 at 5 % have a chance of 1 %.
@@ -146,14 +147,14 @@ def test_step_down_orders_p_by_size_and_is_never_zero(n: int, draws: int, seed: 
 
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.integers(1, 60), min_size=1, max_size=4), st.integers(0, 5))
-def test_any_sizes_of_trials(sizes: list[int], coordinates: int) -> None:
+def test_any_sizes_of_trials(model_of: Any, sizes: list[int], coordinates: int) -> None:
     residuals = [
         Residual(str(i), None, 1e-3 * np.arange(n), np.full(n, 0.02), (), np.zeros(n), np.zeros(n))
         for i, n in enumerate(sizes)
     ]
     total = sum(sizes)
     fit = LinearFit(_rng(0).normal(size=(total, coordinates)), np.ones(total), np.zeros(coordinates))
-    noise = noise_model([Window(r.trial, 1e-3, coloured_noise(_rng(1), 60)) for r in residuals])
+    noise = model_of([Window(r.trial, 1e-3, coloured_noise(_rng(1), 60)) for r in residuals])
     found = significance(residuals, fit, noise, draws=20)
     assert found.rms_f0.shape == found.p_value.shape == (len(sizes),)
     assert np.all((found.p_value > 0.0) & (found.p_value <= 1.0))

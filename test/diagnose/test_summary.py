@@ -88,6 +88,14 @@ def test_physics_says_what_where_why_how_sure_and_what_next() -> None:
     )
 
 
+def test_noise_says_where_it_comes_from() -> None:
+    trials = [{"trial": "a", "noise_sd_f0": 0.002, "noise_from": source} for source in ("window", "curve")]
+    assert "The noise of the recordings is 0.20 % F0, by what smooth curves" in summary_text(
+        diagnosis("none", trials=trials)
+    )
+    assert "curves" not in summary_text(diagnosis("none", trials=trials[:1]))
+
+
 @pytest.mark.parametrize(
     ("verdict", "says"),
     [

@@ -1,4 +1,7 @@
-"""Whether parts of a study want parameters that conflict: what each would gain by having its own."""
+"""Whether parts of a study want parameters that conflict: what would be gone if each part had its own, to first order.
+
+A mismatch between the parts goes, whatever makes it; one within the trials, in how force follows length, stays.
+"""
 
 from __future__ import annotations
 
@@ -10,85 +13,61 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.cells import Residual
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise_model import NoiseModel
-from xb_muscle_ros.diagnose.significance import null_residuals, sharpened
-from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.diagnose.noise.model import NoiseModel
 
 Array = npt.NDArray[np.float64]
 
-_LEAST_F0 = 1e-12
-
 
 class Conflict(NamedTuple):
-    """One part of a study against the rest.
+    """One way of parting a study.
 
     Attributes:
-        group: name of the part.
-        gain_f0: root-mean-square force by which its residual would change if it had its own coordinates, F0.
-        p_value: chance that noise makes any part gain as much.
-        moves: how far each coordinate would go for this part, in its moved scale, shape (coordinates,).
+        between: what the parts differ in: `solutions` (pCa), `protocols` (order of phases) or `trials`.
+        parts: how many.
+        gone: share of the mismatch's mean square beyond noise that goes if each part has its own coordinates.
+        furthest: that any coordinate moves for it, in its moved scale (1: a factor of e for most parameters).
     """
 
-    group: str
-    gain_f0: float
-    p_value: float
-    moves: Array
+    between: str
+    parts: int
+    gone: float
+    furthest: float
 
 
-def conflicts(
-    residuals: Sequence[Residual],
-    groups: Sequence[str],
-    fit: LinearFit,
-    noise: NoiseModel,
-    draws: int = 300,
-    seed: int = 1,
-) -> list[Conflict]:
-    """Each part's gain, to first order, against that from noise put through the same fit; largest gain first.
+def conflicts(residuals: Sequence[Residual], fit: LinearFit, noise: NoiseModel) -> list[Conflict]:
+    """All ways of parting that make two parts or more; none where there is only noise.
 
     Args:
         residuals: of all trials, after the fit of all.
-        groups: name of the part that each trial belongs to (its protocol, pCa, ...).
         fit: its normal equations, samples in the order of the residuals.
-        noise, draws, seed: see `significance.significance`.
-
-    Raises:
-        UserError: fewer than two parts, marks that do not belong to the trials, and what `significance` raises.
+        noise: of the trials; others may be among them.
     """
-    names = list(dict.fromkeys(groups))
-    if len(groups) != len(residuals) or len(names) < 2:
-        raise UserError(
-            f"{len(names)} parts for {len(residuals)} trials ({len(groups)} marks); needed are two and one mark each"
-        )
-    sharp = sharpened(residuals, fit, noise)
-    of_sample = np.repeat(groups, [r.time_s.size for r in residuals])
-    parts = [_Part(sharp, of_sample == name) for name in names]
+    sizes = [r.time_s.size for r in residuals]
     values = np.concatenate([r.value_f0 for r in residuals])[:, None]
-    drawn = [[part.gain(x) for part in parts] for x in null_residuals(residuals, sharp, noise, draws, seed)]
-    null = np.log(np.maximum(np.concatenate(drawn, axis=1), _LEAST_F0))
-    gains = np.array([part.gain(values)[0] for part in parts])
-    centre, sd = np.mean(null, axis=1, keepdims=True), np.maximum(np.std(null, axis=1, keepdims=True), 1e-6)
-    largest = np.max((null - centre) / sd, axis=0)
-    size = (np.log(np.maximum(gains, _LEAST_F0)) - centre[:, 0]) / sd[:, 0]
-    p = (1.0 + np.count_nonzero(largest >= size[:, None], axis=1)) / (1.0 + largest.size)
-    found = [
-        Conflict(name, float(gain), float(q), part.moves(values)[:, 0])
-        for name, gain, q, part in zip(names, gains, p, parts, strict=True)
-    ]
-    return sorted(found, key=lambda row: -row.gain_f0)
+    of_noise = sum(n * of.sd_f0**2 for n, of in zip(sizes, noise.of([r.trial for r in residuals]).trials, strict=True))
+    excess = float(np.sum(values**2)) - of_noise
+    if excess <= 0.0:
+        return []
+    found: list[Conflict] = []
+    for between, marks in _partings(residuals).items():
+        names = list(dict.fromkeys(marks))
+        # Where every part is a single trial, that is what parts are.
+        if len(names) < 2 or (len(names) == len(residuals) and between != "trials"):
+            continue
+        left, furthest, of_sample = 0.0, 0.0, np.repeat([names.index(mark) for mark in marks], sizes)
+        for part in range(len(names)):
+            inside = of_sample == part
+            own = LinearFit(fit.slopes[inside], fit.weights[inside], fit.prior)
+            left += float(np.sum(own.left(values[inside]) ** 2))
+            furthest = max(furthest, float(np.max(np.abs(own.moved(values[inside])), initial=0.0)))
+        found.append(Conflict(between, len(names), 1.0 - max(left - of_noise, 0.0) / excess, furthest))
+    return found
 
 
-class _Part:
-    """Samples of one part, fitted by themselves from where the fit of all ended."""
-
-    def __init__(self, fit: LinearFit, which: npt.NDArray[np.bool_]) -> None:
-        self.which = which
-        self.fit = LinearFit(fit.slopes[which], fit.weights[which], fit.prior)
-
-    def moves(self, values: Array) -> Array:
-        """Of the coordinates, shape (coordinates, columns)."""
-        return self.fit.moved(values[self.which])
-
-    def gain(self, values: Array) -> Array:
-        """Root-mean-square change of the residual, shape (columns,)."""
-        out: Array = np.sqrt(np.mean((self.fit.slopes @ self.moves(values)) ** 2, axis=0))
-        return out
+def _partings(residuals: Sequence[Residual]) -> dict[str, list[str]]:
+    """Name of the part that each trial belongs to, by what the parts differ in."""
+    return {
+        "solutions": ["changing" if r.pca is None else f"{r.pca:g}" for r in residuals],
+        "protocols": ["/".join(p.name for p in r.phases) for r in residuals],
+        "trials": [r.trial for r in residuals],
+    }

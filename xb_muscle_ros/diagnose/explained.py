@@ -18,11 +18,15 @@ HOW: Mapping[str, str] = MappingProxyType(
         ),
         "start_rmsd": "The same for the fibre file as it was given, nothing fitted.",
         "noise": (
-            "Standard deviation of force in the isometric window, drift taken out, from an autoregression fitted "
-            "by restricted likelihood."
+            "Standard deviation of force while the muscle only holds, drift taken out, from an autoregression fitted "
+            "by restricted likelihood. Where trials hold for fewer than 60 evenly spaced samples in all: of what a "
+            "cubic and exponentials leave of force while length stands still or, failing that, moves at a constant "
+            "rate, as an autoregression or as white noise with noise that fades in time. What these curves cannot "
+            "follow counts as noise; noise as slow as they are is not seen. A trial that has neither is given the "
+            "noise of the others, as far as they agree."
         ),
         "p_value": (
-            "Parametric bootstrap: noise of the size and colour of the isometric windows (with what is not known "
+            "Parametric bootstrap: noise of the size and colour of that of the recordings (with what is not known "
             "of them) is put through the fit's normal equations, and the largest excess over all places is "
             "compared with the recording's. All places together are wrong no more often than this."
         ),
@@ -34,6 +38,10 @@ HOW: Mapping[str, str] = MappingProxyType(
             "From the same bootstrap, place by place (step-down maxima), so that all places can be looked at together."
         ),
         "map": "Residual of every phase of every trial; long pauses are split into their first 0.1 s and the rest.",
+        "conflicts": (
+            "Each part fitted by itself from where the fit of all ended, to first order and with the same priors: what "
+            "that takes off the mean square, noise taken off both."
+        ),
         "confidence": (
             "Weight of the answer among everything that was fitted in its place, from how far each one is from "
             "the data (a likelihood with two independent differences in each trial), times the share of the "

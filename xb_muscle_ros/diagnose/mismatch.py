@@ -10,10 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.cells import Residual
+from xb_muscle_ros.diagnose.conflict import Conflict, conflicts
 from xb_muscle_ros.diagnose.flexible import flexible_fit
 from xb_muscle_ros.diagnose.kernel import Law, law
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise_model import NoiseModel, isometric_window, noise_model
+from xb_muscle_ros.diagnose.noise.model import NoiseModel
+from xb_muscle_ros.diagnose.noise.trials import noise_of
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.screen import Linear
 from xb_muscle_ros.diagnose.significance import Significance, significance
@@ -67,7 +69,7 @@ class Recordings:
         Raises:
             UserError: no trial holds still for long enough.
         """
-        return Recordings(tuple(trials), noise_model([isometric_window(t) for t in trials]), draws, seed)
+        return Recordings(tuple(trials), noise_of(trials), draws, seed)
 
     def residuals(self, study: Study, linear: Linear) -> list[Residual]:
         """What a fit left of every trial."""
@@ -94,6 +96,10 @@ class Recordings:
     def usual_noise_f0(self) -> float:
         """Median over trials of the noise's standard deviation, F0: one trial's slow creep is not everybody's noise."""
         return float(np.median([noise.sd_f0 for noise in self.noise.trials]))
+
+    def conflicts(self, study: Study, linear: Linear) -> list[Conflict]:
+        """Whether parts of the study want parameters that conflict."""
+        return conflicts(self.residuals(study, linear), linear.fit, self.noise)
 
     def law(self, study: Study, linear: Linear) -> Law | None:
         """The law of what a fit left."""

@@ -14,7 +14,10 @@ from xb_muscle_ros.diagnose.crossval import folds_of, held_out
 from xb_muscle_ros.diagnose.mismatch import Recordings, rmsd, simulated
 from xb_muscle_ros.diagnose.names import MECHANISMS, Name, Verdict
 from xb_muscle_ros.diagnose.next_experiment import Proposal, propose
-from xb_muscle_ros.diagnose.outcome import Outcome, as_json, write
+from xb_muscle_ros.diagnose.noise.model import Source
+from xb_muscle_ros.diagnose.noise.trials import ENOUGH
+from xb_muscle_ros.diagnose.outcome import Outcome, write
+from xb_muscle_ros.diagnose.plain import as_json
 from xb_muscle_ros.diagnose.profile import known
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.screen import Linear
@@ -137,6 +140,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
         last=last,
         heldout=scores,
         bound=bound,
+        conflicts=tuple(recordings.conflicts(study, search.linear)) if detected else (),
         law=recordings.law(study, search.linear) if detected else None,
         known=interval,
         decision=decision,
@@ -232,6 +236,11 @@ def _missing(
     noise = recordings.usual_noise_f0()
     if noise > _NOISY_F0:
         lines.append(f"force with less noise: {100 * noise:.1f} % F0 hides what is looked for")
+    if any(of_trial.source is Source.CURVE for of_trial in recordings.noise.trials):
+        lines.append(
+            f"{ENOUGH} evenly spaced samples of force or more while nothing moves: noise was taken from what smooth "
+            "curves leave of force, which shows none that is as slow as these"
+        )
     spread = float(np.std(np.concatenate(list(measured))))
     if search.final.rmsd_f0 > _UNDESCRIBED * spread:
         lines.append(

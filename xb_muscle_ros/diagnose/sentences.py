@@ -128,7 +128,14 @@ def _noise(facts: Facts) -> Sentence:
     levels = sorted(float(row["noise_sd_f0"]) for row in facts["trials"] if row["noise_sd_f0"] is not None)
     if not levels:
         return []
-    return [Piece(". The noise of the recordings is "), Piece(f"{percent(levels[len(levels) // 2])} % F0", "noise")]
+    level = Piece(f"{percent(levels[len(levels) // 2])} % F0", "noise")
+    curves = [Piece(", by what smooth curves leave of force")] if noise_from(facts, "curve") else []
+    return [Piece(". The noise of the recordings is "), level, *curves]
+
+
+def noise_from(facts: Facts, source: str) -> bool:
+    """Whether the noise of any trial was taken from there."""
+    return any(row["noise_from"] == source for row in facts["trials"])
 
 
 def difference(facts: Facts) -> list[Sentence]:

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.cells import Cell, Residual, cut, exceeding, mean, phase_names, rms
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise_model import NoiseModel
+from xb_muscle_ros.diagnose.noise.model import NoiseModel
 from xb_muscle_ros.errors import UserError
 
 Array = npt.NDArray[np.float64]
@@ -183,14 +183,14 @@ def null_residuals(
     Raises:
         UserError: see `significance`.
     """
-    sizes = [r.time_s.size for r in residuals]
-    _check_samples(residuals, fit)
+    times_s = [r.time_s for r in residuals]
+    samples = _check_samples(residuals, fit)
     if draws < 20:
         raise UserError(f"{draws} draws of noise; at least 20 are needed")
     chosen = noise.of([r.trial for r in residuals])
     random = np.random.default_rng(seed)
-    for part in np.array_split(np.arange(draws), math.ceil(draws * sum(sizes) / _AT_ONCE)):
-        yield fit.left(chosen.draw(sizes, part.size, random)) + fit.pulled(part.size, random)
+    for part in np.array_split(np.arange(draws), math.ceil(draws * samples / _AT_ONCE)):
+        yield fit.left(chosen.draw(times_s, part.size, random)) + fit.pulled(part.size, random)
 
 
 def sharpened(residuals: Sequence[Residual], fit: LinearFit, noise: NoiseModel) -> LinearFit:
@@ -204,21 +204,21 @@ def sharpened(residuals: Sequence[Residual], fit: LinearFit, noise: NoiseModel) 
     _check_samples(residuals, fit)
     variances = []
     for r, of_trial in zip(residuals, noise.of([r.trial for r in residuals]).trials, strict=True):
-        n = r.time_s.size
-        gamma = of_trial.autocovariance(n)
-        # Variance of a mean times samples: as if that many told as much as one independent one.
-        counted = float(2.0 * (1.0 - np.arange(n) / n) @ gamma - gamma[0])
-        variances.append(np.full(n, max(counted, float(gamma[0]))))
+        # As if that many samples told as much as one independent one.
+        counted = of_trial.likeliest.variance_of_mean(r.time_s)
+        variances.append(np.full(r.time_s.size, max(counted, of_trial.sd_f0**2)))
     weighted = fit.weights**2 * np.concatenate(variances)
     used = weighted[fit.weights > 0.0]
     factor = 1.0 / math.sqrt(float(np.mean(used))) if used.size else 1.0
     return replace(fit, weights=fit.weights * max(factor, 1.0))
 
 
-def _check_samples(residuals: Sequence[Residual], fit: LinearFit) -> None:
+def _check_samples(residuals: Sequence[Residual], fit: LinearFit) -> int:
+    """Samples of all trials."""
     samples = sum(r.time_s.size for r in residuals)
     if samples != fit.slopes.shape[0]:
         raise UserError(f"residuals have {samples} samples, the fit's slopes {fit.slopes.shape[0]}; give the same")
+    return samples
 
 
 def family_wise(found: Array, null: Array) -> Array:

@@ -18,10 +18,11 @@ Array = npt.NDArray[np.float64]
 
 _LISTS: Mapping[str, tuple[str, ...]] = {
     "trials": (
-        "trial", "pca", "phases", "noise_sd_f0", "before_rmsd_f0", "after_rmsd_f0", "heldout_before_f0",
-        "heldout_after_f0",
+        "trial", "pca", "phases", "noise_sd_f0", "noise_from", "noise_samples", "before_rmsd_f0", "after_rmsd_f0",
+        "heldout_before_f0", "heldout_after_f0",
     ),
     "mismatch": ("trial", "phase", "start_s", "end_s", "size_f0", "mean_f0", "sign", "p_value"),
+    "conflicts": ("between", "parts", "gone", "furthest"),
     "nuisances": ("name", "group", "value", "sd", "prior_sd", "unit"),
     "base_parameters": ("name", "start", "fitted", "unit"),
     "candidates": (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from xb_muscle_ros.diagnose.words import quantity
 from xb_muscle_ros.figures.diagnose_common import svg
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
@@ -27,7 +28,7 @@ def draw_kernel(facts: Mapping[str, Any]) -> list[str]:
             at = 1e3 * float(kernel["time_constant_s"])
             axes.axvline(at, color=SECOND, linewidth=0.9, linestyle=(0, (4, 2)))
             axes.text(
-                at, 1.01, f"{at:.3g} ms", color=SECOND, fontsize=7.5, ha="center", va="bottom",
+                at, 1.01, quantity(at, "ms"), color=SECOND, fontsize=7.5, ha="center", va="bottom",
                 transform=axes.get_xaxis_transform(),
             )  # fmt: skip
         axes.set_xscale("log")

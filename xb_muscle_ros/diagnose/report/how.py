@@ -34,7 +34,7 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "start_rmsd": Kind(
             "Force RMSD of the fibre file", "Force RMSD of the model with the values of the fibre file as it was given."
         ),
-        "noise": Kind("Noise", "Standard deviation of the measured force where nothing happens to the fibre."),
+        "noise": Kind("Noise", "Standard deviation of the measured force beside all that the fibre does."),
         "p_value": Kind(
             "Chance",
             "Share of simulated repeats of the recordings, made by the fitted model with noise like the measured, in "
@@ -49,6 +49,10 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
             "Chance that any of the places looked at shows as much: corrected for looking at many.",
         ),
         "map": Kind("Cells of the map", "Mean and root mean square of measured minus modelled force in the phase."),
+        "conflicts": Kind(
+            "Own parameters for parts of the study",
+            "Share of the mismatch's mean square that is gone if each part has parameters of its own.",
+        ),
         "confidence": Kind(
             "Confidence",
             "Weight of the answer among all candidates compared, from how well each predicts trials left out.",

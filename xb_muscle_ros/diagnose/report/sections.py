@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from xb_muscle_ros.diagnose.report.conflicts import conflicts
 from xb_muscle_ros.diagnose.report.markup import NOTHING, Markup, escaped, named, prose
-from xb_muscle_ros.diagnose.sentences import LAW
+from xb_muscle_ros.diagnose.sentences import LAW, noise_from
 from xb_muscle_ros.diagnose.words import SCALES, digits, human, percent, phase_words, quantity
 from xb_muscle_ros.diagnose.written import Written
 from xb_muscle_ros.figures.diagnose_common import after_name, augmented, by_activation
@@ -19,6 +20,11 @@ from xb_muscle_ros.figures.diagnose_trials import draw_trials
 Facts = Mapping[str, Any]
 
 _MOST_ROWS = 20
+# Where noise was not taken from a window in which the muscle only holds: mark and words.
+_NOISE_FROM = {
+    "curve": ("*", "Noise: what smooth curves leave of force, for want of enough time without movement"),
+    "others": ("†", "Noise: like that of the other trials"),
+}
 
 
 def where(page: Markup, written: Written) -> str:
@@ -35,7 +41,7 @@ def where(page: Markup, written: Written) -> str:
         + (f" {more} smaller ones are in <code>diagnosis.json</code>." if more else "")
     )
     head = ["Phase", "Trial", "pCa", "From–to (s)", "Size (% F<sub>0</sub>)", "Mean (% F<sub>0</sub>)", "p"]
-    return f"{_map(page, facts)}\n{page.table(caption, head, rows, words=2)}"
+    return f"{_map(page, facts)}\n{page.table(caption, head, rows, words=2)}\n{conflicts(page, facts)}"
 
 
 def _map(page: Markup, facts: Facts) -> str:
@@ -92,7 +98,7 @@ def kernel(page: Markup, written: Written) -> str:
         )
     words = []
     if found["time_constant_s"] is not None:
-        number = page.number(f"{1e3 * found['time_constant_s']:.3g} ms", "kernel")
+        number = page.number(quantity(1e3 * found["time_constant_s"], "ms"), "kernel")
         words.append(f"Memory of the speed of length change that describes it best: time constant {number}.")
     if found["scales_with"] in SCALES:
         words.append(f"What is left {SCALES[found['scales_with']]}.")
@@ -130,7 +136,8 @@ def before_after(page: Markup, written: Written) -> str:
         given = f" With the values of the fibre file as it was given, the error over all trials is {number}."
     name = after_name(facts)
     which = f"base model and {name}" if two else "base model"
-    caption = f"Force RMSD of every trial in % F<sub>0</sub>, {which}.{given}"
+    marks = "".join(f" {mark} {words}." for source, (mark, words) in _NOISE_FROM.items() if noise_from(facts, source))
+    caption = f"Force RMSD of every trial in % F<sub>0</sub>, {which}.{given}{marks}"
     short = name.removesuffix(" model")
     columns = ["Fitted: base", short, "Left out: base", short] if two else ["Fitted", "Left out"]
     return figure + page.table(caption, ["Trial", "pCa", "Noise", *columns], rows)
@@ -148,10 +155,11 @@ def _overall(facts: Facts) -> Facts:
 
 
 def _trial(page: Markup, row: Facts, two: bool) -> list[str]:
+    mark, _ = _NOISE_FROM.get(str(row["noise_from"]), ("", ""))
     return [
         named(row["trial"]),
         NOTHING if row["pca"] is None else f"{row['pca']:g}",
-        page.cell(_percent(row["noise_sd_f0"]), "noise"),
+        page.cell(_percent(row["noise_sd_f0"]), "noise") + mark,
         *_errors(page, row, two),
     ]
 

@@ -1,0 +1,165 @@
+"""From what the noise of each trial is taken, and how right it is where no trial holds still for long."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from xb_muscle_ros.diagnose.cells import Residual
+from xb_muscle_ros.diagnose.linear_fit import LinearFit
+from xb_muscle_ros.diagnose.noise.model import NoiseModel, Source
+from xb_muscle_ros.diagnose.noise.trials import by_windows, completed, noise_of
+from xb_muscle_ros.diagnose.noise.windows import Window
+from xb_muscle_ros.diagnose.significance import significance
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.trial import Trial
+
+Array = npt.NDArray[np.float64]
+Windows = Callable[..., list[Window]]
+SDS = (2e-3, 1e-3, 4e-3)
+
+
+def quick(made: Any, seed: int, shape: str = "exponentials") -> tuple[list[Trial], list[Array]]:
+    """Three trials at 1 kHz with a hold of 50 ms, their noise fading within 20 ms, and the noise."""
+    times = made.even_times(0.08, 0.05, 1e-3)
+    return study(made, seed, times, 0.08, 0.0195, 1.0, shape)
+
+
+def slow(
+    made: Any, seed: int, shape: str = "exponentials", tau_s: float = 0.02, share: float = 0.5
+) -> tuple[list[Trial], list[Array]]:
+    """Three trials with a hold of 60 s, sampled further and further apart."""
+    return study(made, seed, made.spreading_times(0.1, 60.0), 0.1, tau_s, share, shape)
+
+
+def study(
+    made: Any, seed: int, times: Array, ramp_s: float, tau_s: float, share: float, shape: str
+) -> tuple[list[Trial], list[Array]]:
+    random = np.random.default_rng(seed)
+    noise = [sd * made.fading_noise(random, times, tau_s, share) for sd in SDS]
+    return [made.relaxing(f"t{i}", times, ramp_s, e, shape) for i, e in enumerate(noise)], noise
+
+
+def covers(model: NoiseModel, trials: Sequence[Trial], noise: Sequence[Array]) -> list[bool]:
+    """Whether draws spread around the size of each trial's noise."""
+    drawn = model.draw([t.force_time_s for t in trials], 100, np.random.default_rng(0))
+    parts = np.split(drawn, np.cumsum([e.size for e in noise])[:-1])
+    found = []
+    for part, e in zip(parts, noise, strict=True):
+        low, high = np.quantile(np.sqrt(np.mean(part**2, axis=0)), [0.02, 0.98])
+        found.append(bool(low < np.sqrt(np.mean(e**2)) < high))
+    return found
+
+
+@pytest.mark.parametrize("shape", ["exponentials", "power", "active"])
+@pytest.mark.parametrize("make", [quick, slow])
+def test_noise_beside_a_transient_is_of_the_right_size(made: Any, make: Any, shape: str) -> None:
+    """A fall from 30 % F0 is no noise, and noise of 0.1 to 0.4 % F0 is not taken for part of it."""
+    logs, covered = [], []
+    for seed in range(8):
+        trials, noise = make(made, seed, shape)
+        model = noise_of(trials)
+        assert {n.source for n in model.trials} == {Source.CURVE}
+        logs += [np.log(n.sd_f0 / sd) for n, sd in zip(model.trials, SDS, strict=True)]
+        covered += covers(model, trials, noise)
+    # 50 ms hold two or three independent samples of noise that fades within 20 ms.
+    assert abs(np.median(logs)) < 0.2
+    assert np.quantile(np.abs(logs), 0.9) < (0.6 if make is quick else 0.35)
+    assert np.mean(covered) > 0.85
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.integers(0, 10_000), st.floats(0.001, 0.3), st.floats(0.0, 1.0), st.sampled_from(["exponentials", "power"]))
+def test_size_whatever_the_memory(made: Any, seed: int, tau_s: float, share: float, shape: str) -> None:
+    """Within a factor of two for every memory that is short beside the hold."""
+    trials, _ = slow(made, seed, shape, tau_s, share)
+    for noise, sd in zip(noise_of(trials).trials, SDS, strict=True):
+        assert 0.5 < noise.sd_f0 / sd < 2.0
+
+
+@pytest.mark.parametrize("make", [quick, slow])
+def test_false_alarms_on_noise_taken_from_curves(made: Any, make: Any) -> None:
+    """Studies without a mismatch, whose noise is estimated beside transients that a fit took away."""
+    p = []
+    for seed in range(12):
+        trials, noise = make(made, seed)
+        residuals = [
+            Residual(t.facts.trial, 6.0, t.force_time_s, e, t.facts.phases, t.length_change_l0, np.ones(e.size))
+            for t, e in zip(trials, noise, strict=True)
+        ]
+        found = significance(residuals, LinearFit.nothing(sum(e.size for e in noise)), noise_of(trials), 60, seed)
+        assert not found.detected()
+        p.append(found.overall_p)
+    # 4 and more of 12 at 5 % have a chance of 0.2 %.
+    assert np.count_nonzero(np.array(p) <= 0.05) <= 3
+
+
+def test_windows_where_trials_hold_still_for_long_enough(made: Any) -> None:
+    times = made.even_times(0.08, 0.3, 1e-3)
+    trials, _ = study(made, 0, times, 0.08, 0.0195, 1.0, "exponentials")
+    model = noise_of(trials)
+    assert [(n.source, n.samples) for n in model.trials] == [(Source.WINDOW, 100)] * 3
+
+
+def test_each_trial_by_what_it_has(made: Any) -> None:
+    """Windows where samples are even, curves where they are not, and the others' noise where there is nothing."""
+    times = made.even_times(0.08, 0.3, 1e-3)
+    (even, _, loud), _ = study(made, 0, times, 0.08, 0.0195, 1.0, "exponentials")
+    (uneven, *_), _ = slow(made, 1)
+    uneven = replace(uneven, facts=replace(uneven.facts, trial="uneven"))
+    short = replace(even, facts=replace(even.facts, trial="short"), force_time_s=times[:9], force_n=np.ones(9))
+    model = noise_of([short, even, uneven, loud])
+    assert [n.source for n in model.trials] == [Source.OTHERS, Source.WINDOW, Source.CURVE, Source.WINDOW]
+    assert [n.trial for n in model.trials] == ["short", "t0", "uneven", "t2"]
+    sizes = [n.sd_f0 for n in model.trials[1:]]
+    assert min(sizes) < model.trials[0].sd_f0 < max(sizes)
+
+
+def test_slow_samples_know_no_hum(made: Any) -> None:
+    """White noise at 10 Hz is neither thought to last for long nor to be larger than it is."""
+    times = made.even_times(1.0, 5.0, 0.1)
+    trials, _ = study(made, 0, times, 1.0, 0.02, 0.5, "exponentials")
+    model = noise_of([replace(t, facts=replace(t.facts, phases=t.facts.phases[1:])) for t in trials])
+    for noise, sd in zip(model.trials, SDS, strict=True):
+        assert noise.source is Source.CURVE
+        assert 0.7 < noise.sd_f0 / sd < 1.4
+        assert noise.likeliest.variance_of_mean(times) < 3.0 * sd**2
+
+
+def test_trial_without_any_has_the_noise_of_the_others(windows: Windows) -> None:
+    known = by_windows(windows(0, 200))
+    model = completed(known, {**dict.fromkeys(known, 1e-3), "none": 1e-3})
+    last, sizes = model.trials[-1], [n.sd_f0 for n in known.values()]
+    assert (last.trial, last.source, last.samples) == ("none", Source.OTHERS, 0)
+    assert min(sizes) < last.sd_f0 < max(sizes)
+    drawn = model.of(["none"]).draw([np.arange(500) * 1e-3], 200, np.random.default_rng(0))
+    # Not knowing which of the others it is like, sizes differ by more than a factor of two.
+    low, high = np.quantile(np.std(drawn, axis=0), [0.1, 0.9])
+    assert high > 2.0 * low
+
+
+def test_errors_are_one_line(made: Any) -> None:
+    with pytest.raises(UserError, match="no trial holds still or moves at a constant rate for 20 samples"):
+        noise_of([])
+    times = made.even_times(0.01, 0.01, 1e-3)
+    trial = made.relaxing("a", times, 0.01, np.zeros(times.size))
+    with pytest.raises(UserError, match="no trial holds still"):
+        noise_of([trial])
+    with pytest.raises(UserError, match="trial a: force is not finite"):
+        noise_of([replace(trial, force_n=np.full(times.size, np.nan))])
+
+
+def test_silence_is_allowed(made: Any) -> None:
+    """A recording without noise: as little as is allowed, however it is sampled."""
+    for times in (made.spreading_times(0.1, 60.0), made.even_times(0.08, 0.05, 1e-3)):
+        trial = made.relaxing("a", times, 0.1, np.zeros(times.size))
+        still = replace(trial, force_n=np.full(times.size, 0.3))
+        (noise,) = noise_of([still]).trials
+        assert noise.sd_f0 == 1e-5

@@ -1,0 +1,1 @@
+"""Noise of a study's recordings: where it shows, what is known of it, and draws."""
