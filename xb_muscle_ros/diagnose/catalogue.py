@@ -83,7 +83,7 @@ def _of_sigmoid(base: Mapping[str, float]) -> Starts:
 
 def _of_always_on(base: Mapping[str, float]) -> Starts:
     """Thick filaments that force switches on; more attachment makes up for the heads that are super-relaxed."""
-    return tuple({"JF": jf, "f": base.get("f", 50.0) * more} for jf, more in ((30.0, 2.0), (200.0, 2.0), (1000.0, 1.5)))
+    return tuple({"JF": jf, "f": base.get("f", 50.0) * more} for jf, more in ((30.0, 2.0), (200.0, 2.0), (1000.0, 1.1)))
 
 
 _ROWS = (

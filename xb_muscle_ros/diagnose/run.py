@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.diagnose.crossval import folds_of, held_out
+from xb_muscle_ros.diagnose.crossval import HeldOut, difference, folds_of, held_out
 from xb_muscle_ros.diagnose.mismatch import Recordings, rmsd, simulated
 from xb_muscle_ros.diagnose.names import MECHANISMS, Name, Verdict
 from xb_muscle_ros.diagnose.next_experiment import Proposal, propose
@@ -105,13 +105,18 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
     study = searcher.study
     before = recordings.significance(study, search.linear)
     detected = before.detected(_ALPHA)
+    folds = folds_of(study, effort.folds)
+
+    def scored(fits: Sequence[Fit]) -> dict[str, HeldOut]:
+        return held_out(study, fits, folds, max(6, effort.most // 2), options) if folds else {}
+
+    scores = _kept_to_what_foretells(search, scored)
     if detected and search.final is not search.base:
         searcher.compete(search)
     last = Linear.of(study, search.final)
     after = recordings.significance(study, last)
-    folds = folds_of(study, effort.folds)
-    scored = _to_score(search, effort.rivals) if detected else [search.base]
-    scores = held_out(study, scored, folds, max(6, effort.most // 2), options) if folds else {}
+    wanted = _to_score(search, effort.rivals) if detected else [search.base]
+    scores |= scored([f for f in wanted if f.explanation.label not in scores])
     bound = recordings.bound(study, search.linear, last, folds) if folds and detected else None
     lead = _lead(search)
     interval = known(study, search.final, lead, effort.profiled, options) if lead and detected else None
@@ -151,6 +156,26 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
         seconds=time.monotonic() - begun,
         seed=seed,
     )
+
+
+def _kept_to_what_foretells(
+    search: Search, scored: Callable[[Sequence[Fit]], dict[str, HeldOut]]
+) -> dict[str, HeldOut]:
+    """Take out of the final explanation what makes predictions of trials left out worse; returns the scores seen."""
+    scores: dict[str, HeldOut] = {}
+    while len(names := search.final.explanation.names) > 1:
+        shorter = [
+            search.fits[e.label] for n in names if (e := search.final.explanation.without(n)).label in search.fits
+        ]
+        best = min(shorter, key=penalised, default=None)
+        if best is None:
+            break
+        scores |= scored([f for f in (search.final, best) if f.explanation.label not in scores])
+        after, before = (scores.get(f.explanation.label) for f in (search.final, best))
+        if after is None or before is None or difference(after, before).delta_elpd >= 0.0:
+            break
+        search.final = best
+    return scores
 
 
 def _to_score(search: Search, rivals: int) -> list[Fit]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.diagnose.catalogue import CATALOGUE
 from xb_muscle_ros.diagnose.closure import closure_error
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.refit import Fit, fit_of, refit_task
@@ -35,6 +37,7 @@ class Effort:
         candidates: fitted at the first step.
         later: fitted at each further step, where every one is a model that has to be compiled first.
         most: points to try in a fit.
+        anew: leading explanations of a step that are fitted a second time, from the fibre file's own values.
         folds: into which trials are split for held-out scores.
         rivals: of the answer whose held-out scores are computed.
         draws: of the bootstrap.
@@ -45,7 +48,8 @@ class Effort:
     steps: int = 3
     candidates: int = 8
     later: int = 4
-    most: int = 20
+    most: int = 40
+    anew: int = 5
     folds: int = 7
     rivals: int = 4
     draws: int = 500
@@ -53,7 +57,7 @@ class Effort:
     profiled: bool = True
 
 
-QUICK = Effort(steps=2, candidates=6, later=3, most=12, folds=3, rivals=2, draws=400, profiled=False)
+QUICK = Effort(steps=2, candidates=6, later=3, most=20, anew=3, folds=3, rivals=2, draws=400, profiled=False)
 
 
 @dataclass
@@ -91,8 +95,6 @@ class Search:
 
 def penalised(fit: Fit) -> float:
     """Cost with what its parameters cost; a fault with a value for each trial counts once, its prior does the rest."""
-    from xb_muscle_ros.diagnose.catalogue import CATALOGUE
-
     parameters = sum(len(CATALOGUE[name].parameters) for name in fit.explanation.mechanisms)
     return fit.cost + PENALTY * (parameters + len(fit.explanation.faults))
 
@@ -104,26 +106,47 @@ class Searcher:
         self.study, self.effort, self.options = study, effort, options
         self.fits: dict[str, Fit] = {}
 
+    def _task(self, explanation: Explanation, starts: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+        return {
+            "study": self.study.to_json(),
+            "names": [n.value for n in explanation.names],
+            "starts": [dict(s) for s in starts],
+            "held_out": [],
+            "most": self.effort.most,
+            "predict": False,
+        }
+
     def fitted(self, wanted: Sequence[tuple[Explanation, Sequence[dict[str, float]]]], label: str) -> list[Fit]:
         """Fits of explanations, each from its starts; those without a solution are left out."""
-        plain = self.study.to_json()
-        fresh = [(e, starts) for e, starts in wanted if e.label not in self.fits]
-        tasks = [
-            {
-                "study": plain,
-                "names": [n.value for n in explanation.names],
-                "starts": [dict(s) for s in starts],
-                "held_out": [],
-                "most": self.effort.most,
-                "predict": False,
-            }
-            for explanation, starts in fresh
-        ]
+        tasks = [self._task(e, starts) for e, starts in wanted if e.label not in self.fits]
         for row in run(refit_task, tasks, replace(self.options, label=label)):
             if row is not None:
                 fit = fit_of(row)
                 self.fits[fit.explanation.label] = fit
         return [self.fits[e.label] for e, _ in wanted if e.label in self.fits]
+
+    def _anew(self, fits: Sequence[Fit]) -> list[Fit]:
+        """The same explanations, those that lead and those that a poor start may have hidden fitted once more.
+
+        Parameters that made up for what was missing lie far from where they belong with it, and valleys between are
+        long: the second descent starts from the fibre file's own values of them.
+        """
+        order = sorted(fits, key=penalised)
+        swapped = [f for f in order if any(CATALOGUE[n].effect is None for n in f.explanation.mechanisms)]
+        again = [*order[: self.effort.anew], *(f for f in swapped if f not in order[: self.effort.anew])]
+        own = {c.label for c in self.study.problem(Explanation(), {}).coordinates}
+        found = {f.explanation.label: f for f in fits}
+        tasks = []
+        for fit in again:
+            starts: list[dict[str, float]] = [{k: v for k, v in fit.values.items() if k not in own}]
+            if len(fit.explanation.mechanisms) == 1:
+                entry = CATALOGUE[fit.explanation.mechanisms[0]]
+                starts += [dict(values) for values in entry.starting_values(self.study.fibre.values)]
+            tasks.append(self._task(fit.explanation, starts))
+        for row in run(refit_task, tasks, replace(self.options, label="once more")):
+            if row is not None and (fit := fit_of(row)).cost < found[fit.explanation.label].cost:
+                found[fit.explanation.label] = self.fits[fit.explanation.label] = fit
+        return list(found.values())
 
     def base(self) -> Fit:
         """Parameters alone, with the closure's error of where they end taken out.
@@ -171,7 +194,7 @@ class Searcher:
         """The best fit with one more explanation, or None where none is worth it."""
         chosen = _promising(candidates, final.cost, self.effort.later if step else self.effort.candidates, step == 0)
         wanted = [(final.explanation.plus(s.name), s.starts) for s in chosen]
-        fits = self.fitted(wanted, f"step {step + 1}")
+        fits = self._anew(self.fitted(wanted, f"step {step + 1}"))
         best = min(fits, key=penalised, default=None)
         if best is None or penalised(final) - penalised(best) < max(2.0 * PENALTY, _WORTH * final.cost):
             return None
