@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.diagnose.crossval import HeldOut, difference, folds_of, held_out
+from xb_muscle_ros.diagnose.crossval import HeldOut, folds_of, held_out
 from xb_muscle_ros.diagnose.mismatch import Recordings, rmsd, simulated
 from xb_muscle_ros.diagnose.names import MECHANISMS, Name, Verdict
 from xb_muscle_ros.diagnose.next_experiment import Proposal, propose
 from xb_muscle_ros.diagnose.noise.model import Source
 from xb_muscle_ros.diagnose.noise.trials import ENOUGH
 from xb_muscle_ros.diagnose.outcome import Outcome, write
+from xb_muscle_ros.diagnose.parsimony import kept_to_what_foretells
 from xb_muscle_ros.diagnose.plain import as_json
 from xb_muscle_ros.diagnose.profile import known
 from xb_muscle_ros.diagnose.refit import Fit
@@ -110,7 +111,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
     def scored(fits: Sequence[Fit]) -> dict[str, HeldOut]:
         return held_out(study, fits, folds, max(6, effort.most // 2), options) if folds else {}
 
-    scores = _kept_to_what_foretells(search, scored)
+    scores = kept_to_what_foretells(search, scored)
     if detected and search.final is not search.base:
         searcher.compete(search)
     last = Linear.of(study, search.final)
@@ -156,26 +157,6 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
         seconds=time.monotonic() - begun,
         seed=seed,
     )
-
-
-def _kept_to_what_foretells(
-    search: Search, scored: Callable[[Sequence[Fit]], dict[str, HeldOut]]
-) -> dict[str, HeldOut]:
-    """Take out of the final explanation what makes predictions of trials left out worse; returns the scores seen."""
-    scores: dict[str, HeldOut] = {}
-    while len(names := search.final.explanation.names) > 1:
-        shorter = [
-            search.fits[e.label] for n in names if (e := search.final.explanation.without(n)).label in search.fits
-        ]
-        best = min(shorter, key=penalised, default=None)
-        if best is None:
-            break
-        scores |= scored([f for f in (search.final, best) if f.explanation.label not in scores])
-        after, before = (scores.get(f.explanation.label) for f in (search.final, best))
-        if after is None or before is None or difference(after, before).delta_elpd >= 0.0:
-            break
-        search.final = best
-    return scores
 
 
 def _to_score(search: Search, rivals: int) -> list[Fit]:
