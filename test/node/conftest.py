@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -49,23 +48,9 @@ def started() -> Iterator[list[Any]]:
 
 
 @pytest.fixture(scope="session")
-def domain() -> Iterator[int]:
-    """A ROS domain of this test run's own."""
-    try:
-        import rclpy  # noqa: F401
-    except ImportError as error:
-        if os.environ.get("CI"):
-            raise
-        pytest.skip(f"ROS 2 cannot be imported: {error}")
-    from xb_muscle_ros.node.process import private_domain
-
-    before = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    yield private_domain()
-    if before is None:
-        del os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"]
-    else:
-        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = before
+def domain(new_domain: Callable[[], int]) -> int:
+    """The ROS domain of all node tests."""
+    return new_domain()
 
 
 class Notes:
