@@ -56,7 +56,7 @@ _RIVALS = 6
 def main() -> int:
     """Run the cases that were asked for."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("cases", nargs="*", choices=list(CASES), default=[], help="default: all")
+    parser.add_argument("cases", nargs="*", type=_case, metavar="CASE", help=f"of {', '.join(CASES)}; default: all")
     parser.add_argument("--recordings", type=Path, nargs="+", default=[Path("../shared/data/recordings")])
     parser.add_argument("--out", type=Path, default=Path("out/recordings"))
     parser.add_argument("--images", type=Path, default=Path("docs/images"))
@@ -64,7 +64,7 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="look less hard")
     parser.add_argument("--again", action="store_true", help="also cases that are done")
     given = parser.parse_args()
-    for case in (CASES[key] for key in given.cases or CASES):
+    for case in given.cases or CASES.values():
         folder = given.out / case.key
         try:
             if given.again or not (folder / "predictions.json").exists():
@@ -79,6 +79,13 @@ def main() -> int:
     write_text(given.page, write_page(done, os.path.relpath(given.images, given.page.parent)))
     print(given.page)
     return 0
+
+
+def _case(key: str) -> Case:
+    """A case by its key; argparse's own choices do not allow for none."""
+    if key not in CASES:
+        raise argparse.ArgumentTypeError(f"'{key}' is no case; known: {', '.join(CASES)}")
+    return CASES[key]
 
 
 def run_case(case: Case, recordings: Sequence[Path], folder: Path, quick: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -28,3 +29,19 @@ def shared_data(repo_root: Path) -> Path:
             pytest.fail(f"no recordings at {folder}, and this run must not go without them")
         pytest.skip(f"no recordings at {folder}")
     return folder
+
+
+@pytest.fixture(scope="session")
+def new_domain() -> Iterator[Callable[[], int]]:
+    """Gives ROS domains of this test run's own, on this machine only; tests that need one are skipped without ROS."""
+    try:
+        import rclpy  # noqa: F401
+    except ImportError as error:
+        if os.environ.get("CI"):
+            raise
+        pytest.skip(f"ROS 2 cannot be imported: {error}")
+    from xb_muscle_ros.node.process import private_domain
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        yield private_domain

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 
+from xb_muscle_ros.fit import descents
 from xb_muscle_ros.fit.coordinates import parameter_coordinates
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.problem import Problem
@@ -48,3 +50,23 @@ def problem(start: Fibre, truth: Fibre, made_trials: Maker) -> Problem:
     """Three trials, one of them held out, and the three values that differ."""
     trials = fit_trials(made_trials((4.5, 6.1, 6.3)), [False, False, True])
     return Problem(start, trials, parameter_coordinates(start, ["f", "k21", "kse"], (), {}, {}), {})
+
+
+@pytest.fixture
+def descents_begun(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], list[int]]:
+    """Interrupts the descent of a number, counted from 1; gives a list that grows with each descent begun."""
+
+    def interrupt(number: int) -> list[int]:
+        begun: list[int] = []
+        descend = descents.descend
+
+        def interrupted(*arguments: Any) -> Any:
+            begun.append(len(begun) + 1)
+            if begun[-1] == number:
+                raise KeyboardInterrupt
+            return descend(*arguments)
+
+        monkeypatch.setattr(descents, "descend", interrupted)
+        return begun
+
+    return interrupt

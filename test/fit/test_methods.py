@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,6 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.fit import descents
 from xb_muscle_ros.fit.coordinates import fault_coordinates, parameter_coordinates
 from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.data import fit_trials
@@ -149,28 +149,19 @@ def test_grid_fit_finds_the_values_that_made_the_data(grid_fitted: Fitted, grid_
 
 
 def test_interrupted_grid_fit_goes_on_where_it_was(
-    grid_problem: Problem, grid_fitted: Fitted, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    grid_problem: Problem, grid_fitted: Fitted, tmp_path: Path, descents_begun: Callable[[int], list[int]]
 ) -> None:
     options = replace(HERE, journal=tmp_path / "journal.jsonl")
-    count, descent = 0, descents.descend
-
-    def interrupted(*arguments: object) -> object:
-        nonlocal count
-        count += 1
-        if count == 3:
-            raise KeyboardInterrupt
-        return descent(*arguments)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(descents, "descend", interrupted)
+    begun = descents_begun(3)
     with pytest.raises(KeyboardInterrupt):
         fit(grid_problem, Settings(1, level=None), options)
-    before = count
+    before = len(begun)
     found = fit(grid_problem, Settings(1, level=None), options)
     np.testing.assert_array_equal(found.best.z, grid_fitted.best.z)
     again = fit(grid_problem, Settings(1, level=None), options)
     np.testing.assert_array_equal(again.best.z, grid_fitted.best.z)
     # The start and the first round were kept; the second round was not.
-    assert count >= before + 1
+    assert len(begun) >= before + 1
     assert found.mismatch_f0 == grid_fitted.mismatch_f0
 
 

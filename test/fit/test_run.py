@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.fit import descents
 from xb_muscle_ros.fit import run as fit_run
 from xb_muscle_ros.fit.coordinates import Choice, fault_coordinates, parameter_coordinates
 from xb_muscle_ros.fit.data import fit_trials
@@ -86,26 +85,16 @@ def test_a_fit_is_the_same_wherever_and_again(problem: Problem, fitted: Fitted, 
 
 
 def test_interrupted_fit_goes_on_where_it_was(
-    problem: Problem, fitted: Fitted, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    problem: Problem, fitted: Fitted, tmp_path: Path, descents_begun: Callable[[int], list[int]]
 ) -> None:
     options = replace(HERE, journal=tmp_path / "journal.jsonl")
-    count = 0
-    descend = descents.descend
-
-    def interrupted(*arguments: object) -> object:
-        nonlocal count
-        count += 1
-        if count == 2:
-            raise KeyboardInterrupt
-        return descend(*arguments)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(descents, "descend", interrupted)
+    begun = descents_begun(2)
     with pytest.raises(KeyboardInterrupt):
         fit(problem, Settings(starts=2), options)
     found = fit(problem, Settings(starts=2), options)
     np.testing.assert_array_equal(found.best.z, fitted.best.z)
     # One descent before, the other start, and the polish; the first start was kept.
-    assert count == 2 + 2
+    assert len(begun) == 2 + 2
 
 
 def test_pca_shift_of_a_solution_is_found(start: Fibre, made_trials: Maker) -> None:

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-import os
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from many_fibres import NAMES
 
 FIBRE = "18Dec2017a"
 # Discovery takes 0.1 s, at times some seconds; starting Python on a busy machine takes longer.
@@ -24,23 +31,26 @@ def muscle() -> Muscle:
 
 
 @pytest.fixture(scope="session")
-def domain() -> Iterator[int]:
-    """A ROS domain of this test run's own."""
-    try:
-        import rclpy  # noqa: F401
-    except ImportError as error:
-        if os.environ.get("CI"):
-            raise
-        pytest.skip(f"ROS 2 cannot be imported: {error}")
-    from xb_muscle_ros.node.process import private_domain
+def batch() -> MuscleBatch:
+    """Three fibres that differ, in metres and newtons of their own."""
+    files = ("18Dec2017a", "13Dec2017a", "7Aug2018a")
+    made = [replace(load_fibre(file), name=name) for file, name in zip(files, NAMES, strict=True)]
+    return MuscleBatch([replace(f, reference_length_m=0.1 * (k + 1), f0_n=10.0 * (k + 3)) for k, f in enumerate(made)])
 
-    before = os.environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE")
-    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    yield private_domain()
-    if before is None:
-        del os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"]
-    else:
-        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = before
+
+@pytest.fixture
+def started() -> Iterator[list[Any]]:
+    """Benches of realtime threads, which end with the test."""
+    benches: list[Any] = []
+    yield benches
+    for bench in benches:
+        bench.realtime.stop()
+
+
+@pytest.fixture(scope="session")
+def domain(new_domain: Callable[[], int]) -> int:
+    """The ROS domain of all node tests."""
+    return new_domain()
 
 
 class Notes:

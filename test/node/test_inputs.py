@@ -41,7 +41,7 @@ def test_a_sender_that_makes_up_names_does_not_fill_the_memory() -> None:
     names = Names("a")
     for k in range(2000):
         assert names.news([f"n{k}"]) == [f"n{k}"]
-    assert len(names._seen) <= 1000
+    assert len(names._strangers._seen) <= 1000
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1.1, -0.1])

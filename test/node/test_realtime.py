@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import pytest
+from realtime_bench import SETTINGS, Waiting
 
 from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.muscle import Muscle, Outputs
@@ -14,18 +15,9 @@ from xb_muscle_ros.node.inputs import Refusal, Scale
 from xb_muscle_ros.node.realtime import Realtime, Settings
 
 SCALE = Scale(1.0, 1.0)
-SETTINGS = Settings(
-    rate_hz=500.0,
-    extrapolate=False,
-    extrapolation_limit_s=0.02,
-    max_catch_up=10,
-    timeout_s=0.0,
-    on_timeout="isometric",
-    decay_s=0.1,
-)
 
 
-class Bench:
+class Bench(Waiting):
     """A realtime thread, what it emitted and what it said."""
 
     def __init__(self, muscle: Muscle, settings: Settings, notes: Any) -> None:
@@ -44,33 +36,18 @@ class Bench:
         values: Any = self.realtime._state
         return dict(zip(self.realtime.muscle.state_names, values.tolist(), strict=True))
 
-    def until(self, condition: Callable[[], Any]) -> None:
-        """Wait until something holds."""
-        end = time.monotonic() + 10.0
-        while not condition():
-            assert time.monotonic() < end
-            time.sleep(0.002)
-
-    def emit_more(self, count: int) -> None:
-        """Wait for some more ticks."""
-        target = len(self.emitted) + count
-        self.until(lambda: len(self.emitted) >= target)
-
 
 @pytest.fixture
-def make(notes: Any) -> Iterator[Callable[..., Bench]]:
+def make(started: list[Any], notes: Any) -> Callable[..., Bench]:
     """Benches whose threads end with the test."""
-    benches: list[Bench] = []
 
     def start(muscle: Muscle, settings: Settings = SETTINGS) -> Bench:
         bench = Bench(muscle, settings, notes)
-        benches.append(bench)
+        started.append(bench)
         bench.realtime.start()
         return bench
 
-    yield start
-    for bench in benches:
-        bench.realtime.stop()
+    return start
 
 
 def test_settles_then_holds_the_length(make: Callable[..., Bench], muscle: Muscle) -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
@@ -18,24 +17,16 @@ MODEL = "3state_coop"
 
 
 @pytest.fixture(scope="module")
-def nodes() -> Iterator[int]:
+def nodes(new_domain: Callable[[], int]) -> Iterator[int]:
     """Muscle nodes in lockstep for both scenes, in namespaces of their own; their ROS domain."""
-    try:
-        import rclpy  # noqa: F401
-    except ImportError as error:
-        if os.environ.get("CI"):
-            raise
-        pytest.skip(f"ROS 2 cannot be imported: {error}")
-    from xb_muscle_ros.node.process import NodeProcess, private_domain
+    from xb_muscle_ros.node.process import NodeProcess
 
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        domain = private_domain()
-        wanted = {"fiber_file": "18Dec2017a", "model": MODEL, "mode": "lockstep"}
-        ankle = NodeProcess(domain, {**wanted, "fibers": "[soleus, tibialis_anterior]"}, ["-r", "__ns:=/ankle"])
-        knee = NodeProcess(domain, {**wanted, "fibers": "[vasti]"}, ["-r", "__ns:=/knee"])
-        with ankle, knee:
-            yield domain
+    domain = new_domain()
+    wanted = {"fiber_file": "18Dec2017a", "model": MODEL, "mode": "lockstep"}
+    ankle = NodeProcess(domain, {**wanted, "fibers": "[soleus, tibialis_anterior]"}, ["-r", "__ns:=/ankle"])
+    knee = NodeProcess(domain, {**wanted, "fibers": "[vasti]"}, ["-r", "__ns:=/knee"])
+    with ankle, knee:
+        yield domain
 
 
 def test_over_dds_is_as_in_process_and_repeats(nodes: int) -> None:

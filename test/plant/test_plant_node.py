@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 import signal
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -80,23 +79,13 @@ class Stage:
 
 
 @pytest.fixture
-def stage() -> Iterator[Stage]:
+def stage(new_domain: Callable[[], int]) -> Iterator[Stage]:
     """All ends with the test."""
-    try:
-        import rclpy  # noqa: F401
-    except ImportError as error:
-        if os.environ.get("CI"):
-            raise
-        pytest.skip(f"ROS 2 cannot be imported: {error}")
-    from xb_muscle_ros.node.process import private_domain
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        made = Stage(private_domain())
-        yield made
-        for process in made.processes.values():
-            process.stop()
-        made.link.close()
+    made = Stage(new_domain())
+    yield made
+    for process in made.processes.values():
+        process.stop()
+    made.link.close()
 
 
 def episodes(heard: list[tuple[float, float]]) -> list[list[tuple[float, float]]]:

@@ -23,7 +23,7 @@ from std_srvs.srv import Trigger
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Array, Muscle
 from xb_muscle_ros.node.inlet import Inlet
-from xb_muscle_ros.node.inputs import Counts, Scale, length_change_l0
+from xb_muscle_ros.node.inputs import Counts, length_change_l0, scale_of
 from xb_muscle_ros.node.lateness import Lateness
 from xb_muscle_ros.node.outputs import OutputMessages
 from xb_muscle_ros.node.reporter import Reporter
@@ -37,7 +37,7 @@ class PlainTimer(Node):
         super().__init__("plain_timer", automatically_declare_parameters_from_overrides=True)
         fibre = load_fibre(str(self.get_parameter("fiber_file").value))
         self._muscle = Muscle(fibre)
-        self._scale = Scale(fibre.reference_length_m, fibre.f0_n)
+        self._scale = scale_of(fibre)
         self._period = round(1e9 / float(self.get_parameter("rate_hz").value))
         newest = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
         force, moments = (self.create_publisher(JointState, f"muscle/{topic}", 100) for topic in ("force", "moments"))

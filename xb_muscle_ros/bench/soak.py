@@ -147,12 +147,12 @@ def soak(fibre: Fibre, ticks: int, seed: int = 1) -> Soak:
         UserError: a sample was refused or integration failed.
     """
     from xb_muscle_ros.node.inlet import Inlet
-    from xb_muscle_ros.node.inputs import Scale
+    from xb_muscle_ros.node.inputs import scale_of
     from xb_muscle_ros.node.lockstep import Lockstep
     from xb_muscle_ros.node.outputs import OutputMessages
 
     force, moments = _Collector(("effort", "position")), _Collector(("position",))
-    scale = Scale(fibre.reference_length_m, fibre.f0_n)
+    scale = scale_of(fibre)
     log = _Log()
     lockstep = Lockstep(
         Muscle(fibre), scale, OutputMessages(fibre.name, force, moments).publish, log, simulated_time=lambda: False

@@ -11,11 +11,12 @@ from scipy.stats import chi2
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure, save
+from xb_muscle_ros.figures.trial_pages import Look, pages_of, panels, size_mm
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.run import Fitted
 
-_COLUMNS = 3
 _PER_PAGE = 12
+_LOOK = Look((3, 1), 0.08, "Force (F$_0$)", "Residual\n(% F$_0$)", row_mm=60.0, extra_mm=14.0)
 _KINDS = {
     "isometric_force": ("Isometric force", "F$_0$"),
     "srs_conditioning": ("SRS, unconditioned", "F$_0$/L$_0$"),
@@ -48,24 +49,12 @@ def _trials(path: Path, fitted: Fitted) -> list[Path]:
     """Pages of at most twelve trials: measured force, the start's and the fitted model's, and what is left between."""
     trials = fitted.problem.trials
     pages = []
-    for page in range(0, len(trials), _PER_PAGE):
-        here = path if page == 0 else path.with_name(f"{path.stem}_{page // _PER_PAGE + 1}{path.suffix}")
-        chosen = trials[page : page + _PER_PAGE]
-        columns = min(_COLUMNS, len(chosen))
-        rows = -(-len(chosen) // columns)
-        with figure(20.0 + 58.0 * columns, 14.0 + 60.0 * rows) as made:
-            grid = made.add_gridspec(rows, columns)
+    for here, chosen in pages_of(path, len(trials), _PER_PAGE):
+        shown = trials[chosen]
+        with figure(*size_mm(len(shown), _LOOK)) as made:
             handles: list[Any] = []
-            for i, trial in enumerate(chosen):
-                cell = grid[i // columns, i % columns].subgridspec(2, 1, height_ratios=(3, 1), hspace=0.08)
-                upper = made.add_subplot(cell[0])
-                lower = made.add_subplot(cell[1], sharex=upper)
+            for (upper, lower), trial in zip(panels(made, len(shown), _LOOK), shown, strict=True):
                 handles = _panel(upper, lower, fitted, trial)
-                if i % columns == 0:
-                    upper.set_ylabel("Force (F$_0$)")
-                    lower.set_ylabel("Residual\n(% F$_0$)")
-                if i // columns == rows - 1 or i + columns >= len(chosen):
-                    lower.set_xlabel("Time (s)")
             made.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False)
             save(made, here)
         pages.append(here)

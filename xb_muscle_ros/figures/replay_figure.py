@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, SHADE, figure, save
+from xb_muscle_ros.figures.trial_pages import Look, pages_of, panels, size_mm
 from xb_muscle_ros.trials.simulated import Simulated
 from xb_muscle_ros.trials.trial import Trial
 
-_COLUMNS = 3
 _PER_PAGE = 9
+_LOOK = Look((1, 3), 0.05, "ΔL (% L$_0$)", "Force (F$_0$)", row_mm=58.0, extra_mm=12.0)
 
 
 def draw_replay(
@@ -34,9 +35,7 @@ def draw_replay(
         paths of the pages.
     """
     pages = []
-    for page in range(0, len(trials), _PER_PAGE):
-        here = path if page == 0 else path.with_name(f"{path.stem}_{page // _PER_PAGE + 1}{path.suffix}")
-        chosen = slice(page, page + _PER_PAGE)
+    for here, chosen in pages_of(path, len(trials), _PER_PAGE):
         _page(here, trials[chosen], simulated[chosen], label, live[chosen] if live is not None else None)
         pages.append(here)
     return pages
@@ -45,22 +44,11 @@ def draw_replay(
 def _page(
     path: Path, trials: Sequence[Trial], simulated: Sequence[Simulated], label: str, live: Sequence[Simulated] | None
 ) -> None:
-    columns = min(_COLUMNS, len(trials))
-    rows = -(-len(trials) // columns)
-    with figure(20.0 + 58.0 * columns, 12.0 + 58.0 * rows) as made:
-        grid = made.add_gridspec(rows, columns)
+    with figure(*size_mm(len(trials), _LOOK)) as made:
         handles: list[Any] = []
-        for i, trial in enumerate(trials):
-            cell = grid[i // columns, i % columns].subgridspec(2, 1, height_ratios=(1, 3), hspace=0.05)
-            upper = made.add_subplot(cell[0])
-            lower = made.add_subplot(cell[1], sharex=upper)
-            lines = _panel(upper, lower, trial, simulated[i], label, live[i] if live is not None else None)
+        for i, (upper, lower) in enumerate(panels(made, len(trials), _LOOK)):
+            lines = _panel(upper, lower, trials[i], simulated[i], label, live[i] if live is not None else None)
             handles = lines if len(lines) > len(handles) else handles
-            if i % columns == 0:
-                upper.set_ylabel("ΔL (% L$_0$)")
-                lower.set_ylabel("Force (F$_0$)")
-            if i // columns == rows - 1 or i + columns >= len(trials):
-                lower.set_xlabel("Time (s)")
         made.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False)
         save(made, path)
 

@@ -4,12 +4,65 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.node.inputs import CALCIUM_UM, Counts, Names, Refusal, checked, stamp_ns
+from xb_muscle_ros.node.several import enumerated
 
 _WARN_EVERY_S = 5.0
+
+
+class Door:
+    """What inlets for one fibre and for many share: whether they are open, and what they refused.
+
+    Attributes:
+        open: whether messages are taken; while closed they are dropped.
+        refused: how often input was refused, by reason.
+        ignored_names: names that belong to no fibre here.
+        last_length_s: steady time of the last length sample that was taken, s.
+    """
+
+    def __init__(self, logger: Any) -> None:
+        self.open = False
+        self.refused = Counts()
+        self.ignored_names = 0
+        self.last_length_s: float | None = None
+        self._logger = logger
+        self._warned: dict[str, float] = {}
+
+    def _ignore(self, names: Sequence[str], here: str) -> None:
+        """Count names that are new, and say which fibres are here."""
+        self.ignored_names += len(names)
+        self._logger.warning(f"names ignored: {enumerated(names)}; this node has {here}")
+
+    def _refuse(self, topic: str, refusal: Refusal, times: int = 1, whose: Sequence[str] = ()) -> None:
+        """Count a refusal, and warn of its reason every few seconds.
+
+        Args:
+            topic: what the message was of.
+            refusal: the first of its kind.
+            times: how many there are.
+            whose: names of fibres, where there are several.
+        """
+        reason = refusal.reason
+        self.refused[reason] += times
+        now = time.monotonic()
+        if now - self._warned.get(reason, -math.inf) >= _WARN_EVERY_S:
+            self._warned[reason] = now
+            of = f" of {enumerated(whose)}" if whose else ""
+            self._logger.warning(f"{topic}{of} refused ({reason}, {self.refused[reason]} so far): {refusal}")
+
+
+def check_velocities(message: Any) -> None:
+    """Check that a message has a velocity for each position, or none.
+
+    Raises:
+        Refusal: it has not.
+    """
+    if message.velocity and len(message.velocity) != len(message.position):
+        raise Refusal("wrong array size", f"{len(message.velocity)} velocities for {len(message.position)} positions")
 
 
 class Taker(Protocol):
@@ -22,27 +75,15 @@ class Taker(Protocol):
         """Stamp in ns, fibre length in m and its velocity in m/s or None."""
 
 
-class Inlet:
-    """Takes ``muscle/length`` and ``muscle/calcium`` for one fibre.
-
-    Attributes:
-        open: whether messages are taken; while closed they are dropped.
-        refused: how often input was refused, by reason.
-        ignored_names: names that belong to no fibre here.
-        last_length_s: steady time of the last length sample that was taken, s.
-    """
+class Inlet(Door):
+    """Takes ``muscle/length`` and ``muscle/calcium`` for one fibre."""
 
     def __init__(self, fibre: str, taker: Taker, logger: Any) -> None:
-        self.open = False
-        self.refused = Counts()
-        self.ignored_names = 0
-        self.last_length_s: float | None = None
+        super().__init__(logger)
         self._names = Names(fibre)
         self._alone = [fibre]
         self._fibre = fibre
         self._taker = taker
-        self._logger = logger
-        self._warned: dict[str, float] = {}
 
     def take_length(self, message: Any) -> None:
         """Callback of ``muscle/length``: position m, velocity m/s or none."""
@@ -52,12 +93,9 @@ class Inlet:
             index = self._index(message)
             if index is None:
                 return
+            check_velocities(message)
             velocity = None
             if message.velocity:
-                if len(message.velocity) != len(message.position):
-                    raise Refusal(
-                        "wrong array size", f"{len(message.velocity)} velocities for {len(message.position)} positions"
-                    )
                 velocity = message.velocity[index]
                 if not math.isfinite(velocity):
                     raise Refusal("not finite", f"velocity is {velocity}")
@@ -86,14 +124,5 @@ class Inlet:
         if names != self._alone:
             new = self._names.news(names)
             if new:
-                self.ignored_names += len(new)
-                self._logger.warning(f"names ignored: {', '.join(new)}; this node has fibre {self._fibre}")
+                self._ignore(new, f"fibre {self._fibre}")
         return index
-
-    def _refuse(self, topic: str, refusal: Refusal) -> None:
-        self.refused[refusal.reason] += 1
-        now = time.monotonic()
-        if now - self._warned.get(refusal.reason, -math.inf) >= _WARN_EVERY_S:
-            self._warned[refusal.reason] = now
-            count = self.refused[refusal.reason]
-            self._logger.warning(f"{topic} refused ({refusal.reason}, {count} so far): {refusal}")

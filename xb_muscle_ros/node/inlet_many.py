@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
 
-from xb_muscle_ros.node.inputs import CALCIUM_UM, Counts, Refusal, checked, stamp_ns
+from xb_muscle_ros.node.inlet import Door, check_velocities
+from xb_muscle_ros.node.inputs import CALCIUM_UM, Refusal, checked, stamp_ns
 from xb_muscle_ros.node.several import Floats, Indices, NamesOfMany, Places, Trouble, enumerated
-
-_WARN_EVERY_S = 5.0
 
 
 class TakerOfMany(Protocol):
@@ -27,23 +25,18 @@ class TakerOfMany(Protocol):
         """Stamp in ns, which fibres, their lengths in m and velocities in m/s or None."""
 
 
-class InletOfMany:
+class InletOfMany(Door):
     """Takes ``muscle/length`` and ``muscle/calcium`` for many fibres; a message may name some of them.
 
-    What is wrong with the message refuses it whole, what is wrong with one fibre's value refuses that. Attributes as
-    of `Inlet`; `refused` counts each fibre's value.
+    What is wrong with the message refuses it whole, what is wrong with one fibre's value refuses that;
+    `refused` counts each fibre's value.
     """
 
     def __init__(self, fibres: Sequence[str], taker: TakerOfMany, logger: Any) -> None:
-        self.open = False
-        self.refused = Counts()
-        self.ignored_names = 0
-        self.last_length_s: float | None = None
+        super().__init__(logger)
         self._names = NamesOfMany(fibres)
         self._fibres = list(fibres)
         self._taker = taker
-        self._logger = logger
-        self._warned: dict[str, float] = {}
 
     def take_length(self, message: Any) -> None:
         """Callback of ``muscle/length``: position m, velocity m/s or none."""
@@ -51,19 +44,14 @@ class InletOfMany:
             return
         try:
             places = self._places(message)
-            velocities = None
-            if message.velocity:
-                if len(message.velocity) != len(message.position):
-                    raise Refusal(
-                        "wrong array size", f"{len(message.velocity)} velocities for {len(message.position)} positions"
-                    )
-                velocities = _chosen(message.velocity, places)
+            check_velocities(message)
         except Refusal as refusal:
-            self._refuse("length", [Trouble(-1, refusal)])
+            self._refuse("length", refusal)
             return
         if not places.fibres.size:
             return
         fibres, positions, troubles = places.fibres, _chosen(message.position, places), []
+        velocities = _chosen(message.velocity, places) if message.velocity else None
         if velocities is not None and not np.isfinite(velocities).all():
             bad = ~np.isfinite(velocities)
             troubles = [
@@ -75,7 +63,7 @@ class InletOfMany:
         if len(troubles) < places.fibres.size:
             self.last_length_s = time.monotonic()
         if troubles:
-            self._refuse("length", troubles)
+            self._tell("length", troubles)
 
     def take_calcium(self, message: Any) -> None:
         """Callback of ``muscle/calcium``: position µM."""
@@ -84,7 +72,7 @@ class InletOfMany:
         try:
             places = self._places(message)
         except Refusal as refusal:
-            self._refuse("calcium", [Trouble(-1, refusal)])
+            self._refuse("calcium", refusal)
             return
         if not places.fibres.size:
             return
@@ -99,36 +87,25 @@ class InletOfMany:
             fibres, values = fibres[good], values[good]
         troubles += self._taker.take_calcium(stamp_ns(message.header.stamp), fibres, values)
         if troubles:
-            self._refuse("calcium", troubles)
+            self._tell("calcium", troubles)
 
     def _places(self, message: Any) -> Places:
         places = self._names.places(message.name, len(message.position), "position")
         if places.new:
-            self.ignored_names += len(places.new)
-            self._logger.warning(
-                f"names ignored: {enumerated(places.new)}; this node has fibres {enumerated(self._fibres)}"
-            )
+            self._ignore(places.new, f"fibres {enumerated(self._fibres)}")
         return places
 
-    def _refuse(self, topic: str, troubles: Sequence[Trouble]) -> None:
+    def _tell(self, topic: str, troubles: Sequence[Trouble]) -> None:
         """Count and say what is wrong, each reason once for all fibres that have it."""
-        by_reason: dict[str, list[Trouble]] = {}
+        by_reason: dict[str, list[tuple[str, Refusal]]] = {}
         for trouble in troubles:
-            error = trouble.error
+            name, error = self._fibres[trouble.fibre], trouble.error
             if isinstance(error, Refusal):
-                by_reason.setdefault(error.reason, []).append(trouble)
+                by_reason.setdefault(error.reason, []).append((name, error))
             else:
-                self._logger.error(f"{self._fibres[trouble.fibre]} stopped: {error}; call ~/reset to start again")
-        now = time.monotonic()
-        for reason, alike in by_reason.items():
-            self.refused[reason] += len(alike)
-            if now - self._warned.get(reason, -math.inf) < _WARN_EVERY_S:
-                continue
-            self._warned[reason] = now
-            whose = enumerated([self._fibres[t.fibre] for t in alike if t.fibre >= 0])
-            of = f" of {whose}" if whose else ""
-            count = self.refused[reason]
-            self._logger.warning(f"{topic}{of} refused ({reason}, {count} so far): {alike[0].error}")
+                self._logger.error(f"{name} stopped: {error}; call ~/reset to start again")
+        for alike in by_reason.values():
+            self._refuse(topic, alike[0][1], len(alike), [name for name, _ in alike])
 
 
 def _chosen(values: Any, places: Places) -> Floats:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Protocol
+
+from xb_muscle_ros.models.fibre_file import Fibre
 
 # What any muscle may be asked for. Wider than muscle works in, narrower than a mistaken unit.
 LENGTH_CHANGE_L0 = (-0.5, 0.5)
@@ -44,9 +46,39 @@ class Scale(NamedTuple):
     f0_n: float
 
 
+def scale_of(fibre: Fibre) -> Scale:
+    """Constants of a fibre."""
+    return Scale(fibre.reference_length_m, fibre.f0_n)
+
+
 def stamp_ns(stamp: Stamp) -> int:
     """Time of a message in ns."""
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def check_one_per_name(names: Sequence[str], fibres: int, values: int, field: str) -> None:
+    """Check that a message has a value for each of its names; without names, for each of the node's fibres.
+
+    Raises:
+        Refusal: it has not.
+    """
+    if values != (len(names) or fibres):
+        raise Refusal("wrong array size", f"{values} values in {field} for {len(names)} names; send one per name")
+
+
+class Strangers:
+    """Names of fibres that a node does not have, each news once."""
+
+    def __init__(self) -> None:
+        self._seen: set[str] = set()
+
+    def news(self, names: Iterable[str]) -> list[str]:
+        """Those that were not met before."""
+        new = [name for name in dict.fromkeys(names) if name not in self._seen]
+        # A sender that makes up names must not fill the memory.
+        if len(self._seen) < 1000:
+            self._seen.update(new)
+        return new
 
 
 class Names:
@@ -54,7 +86,7 @@ class Names:
 
     def __init__(self, fibre: str) -> None:
         self._fibre = fibre
-        self._seen: set[str] = set()
+        self._strangers = Strangers()
 
     def index(self, names: Sequence[str], values: int, field: str) -> int | None:
         """Index of the fibre among the values of a message; None where the message is for other fibres.
@@ -67,19 +99,14 @@ class Names:
         Raises:
             Refusal: there are not as many values as names.
         """
-        if values != (len(names) or 1):
-            raise Refusal("wrong array size", f"{values} values in {field} for {len(names)} names; send one per name")
+        check_one_per_name(names, 1, values, field)
         if not names:
             return 0
         return next((i for i, name in enumerate(names) if name == self._fibre), None)
 
     def news(self, names: Sequence[str]) -> list[str]:
         """Names of other fibres that were not met before."""
-        new = [name for name in dict.fromkeys(names) if name != self._fibre and name not in self._seen]
-        # A sender that makes up names must not fill the memory.
-        if len(self._seen) < 1000:
-            self._seen.update(new)
-        return new
+        return self._strangers.news(name for name in names if name != self._fibre)
 
 
 def checked(value: float, bounds: tuple[float, float], what: str, unit: str) -> float:

@@ -11,7 +11,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.node.inputs import Counts, Refusal, Scale
+from xb_muscle_ros.node.inputs import Counts, Refusal, scale_of
 from xb_muscle_ros.node.several import Chorus, EmitMany, Floats, Indices, Trouble, enumerated, scale_rows
 from xb_muscle_ros.node.status import Account, Log, Snapshot, Status
 from xb_muscle_ros.node.timeline import Plan, Timeline, stepped
@@ -176,11 +176,6 @@ class LockstepMany:
             self._answers += 1
             which = np.array(done, dtype=np.intp)
             self._emit(stamp, which, np.array(rows), self._scales[which])
-
-
-def scale_of(fibre: Fibre) -> Scale:
-    """Constants of a fibre."""
-    return Scale(fibre.reference_length_m, fibre.f0_n)
 
 
 def total(accounts: Iterable[Account]) -> Account:

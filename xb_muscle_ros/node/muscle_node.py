@@ -24,8 +24,9 @@ from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.node.inlet import Inlet
 from xb_muscle_ros.node.inlet_many import InletOfMany
+from xb_muscle_ros.node.inputs import scale_of
 from xb_muscle_ros.node.lockstep import Lockstep
-from xb_muscle_ros.node.lockstep_many import LockstepMany, scale_of
+from xb_muscle_ros.node.lockstep_many import LockstepMany
 from xb_muscle_ros.node.memory import lock_memory, unlock_memory
 from xb_muscle_ros.node.outputs import OutputMessages, OutputMessagesMany
 from xb_muscle_ros.node.parameter_gate import ParameterGate

@@ -11,8 +11,8 @@ from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.node.inputs import LENGTH_CHANGE_L0, Counts, Scale
-from xb_muscle_ros.node.lockstep_many import scale_of, stopped, use_threads
+from xb_muscle_ros.node.inputs import LENGTH_CHANGE_L0, Counts, Scale, scale_of
+from xb_muscle_ros.node.lockstep_many import stopped, use_threads
 from xb_muscle_ros.node.realtime import Settings
 from xb_muscle_ros.node.samples import Flags, Inputs, Samples
 from xb_muscle_ros.node.several import EmitMany, Floats, Indices, Trouble, enumerated, scale_rows

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.node.inputs import Refusal, Scale
+from xb_muscle_ros.node.inputs import Refusal, Scale, Strangers, check_one_per_name
 from xb_muscle_ros.node.status import Log
 
 Floats = npt.NDArray[np.float64]
@@ -48,7 +48,7 @@ class NamesOfMany:
     def __init__(self, fibres: Sequence[str]) -> None:
         self._index = {name: i for i, name in enumerate(fibres)}
         self._all = np.arange(len(fibres))
-        self._seen: set[str] = set()
+        self._strangers = Strangers()
         self._last: tuple[list[str], Places] = ([], Places(self._all, None, []))
 
     def places(self, names: Sequence[str], values: int, field: str) -> Places:
@@ -62,8 +62,7 @@ class NamesOfMany:
         Raises:
             Refusal: there are not as many values as names.
         """
-        if values != (len(names) or len(self._all)):
-            raise Refusal("wrong array size", f"{values} values in {field} for {len(names)} names; send one per name")
+        check_one_per_name(names, len(self._all), values, field)
         last, found = self._last
         if names != last:
             found = self._find(names)
@@ -75,19 +74,14 @@ class NamesOfMany:
         if not names:
             return Places(self._all, None, [])
         place: dict[int, int] = {}
-        new: dict[str, None] = {}
         for k, name in enumerate(names):
             i = self._index.get(name)
             if i is not None:
                 place.setdefault(i, k)
-            elif name not in self._seen:
-                new[name] = None
-        # A sender that makes up names must not fill the memory.
-        if len(self._seen) < 1000:
-            self._seen.update(new)
+        new = self._strangers.news(name for name in names if name not in self._index)
         fibres, values = np.array([*place], dtype=np.intp), np.array([*place.values()], dtype=np.intp)
         in_order = len(values) == len(names) and np.array_equal(values, np.arange(len(names)))
-        return Places(fibres, None if in_order else values, [*new])
+        return Places(fibres, None if in_order else values, new)
 
 
 def enumerated(names: Sequence[str]) -> str:

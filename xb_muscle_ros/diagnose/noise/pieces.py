@@ -4,8 +4,8 @@ While length stands still or moves at a constant rate, force goes over from one 
 steady state relaxes as a mix of exponentials, and a mix of few whose times are evenly spaced in the logarithm comes as
 near as one likes to any relaxation between them, a power law included (Beylkin and Monzon, Applied and Computational
 Harmonic Analysis 19 (2005) 17-48). These and a cubic are taken out of each piece, by restricted likelihood, so that
-what they take from the noise is known and given back. What they cannot follow counts as noise: too much of it, and
-never too little.
+what they take from the noise is known and given back. What they cannot follow counts as noise, rather too much of it
+than too little; noise as slow as they are is not seen (scripts/noise_coverage.py measures both).
 """
 
 from __future__ import annotations

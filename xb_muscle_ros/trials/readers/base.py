@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from xb_muscle_ros.trials.readers.description import ImportMapping
-from xb_muscle_ros.trials.readers.recording import Recording
+from xb_muscle_ros.trials.readers.description import Column, ImportMapping
+from xb_muscle_ros.trials.readers.recording import Recording, Signal
 
 
 class Pending(NamedTuple):
@@ -53,3 +53,39 @@ class Reader(Protocol):
         Raises:
             UserError: the file cannot be read.
         """
+
+
+def begin_of(path: Path, count: int) -> bytes:
+    """The first bytes of a file; none where there is no file."""
+    if not path.is_file():
+        return b""
+    with path.open("rb") as file:
+        return file.read(count)
+
+
+def by_columns(
+    where: str,
+    mapping: ImportMapping,
+    signal: Callable[[Column], Signal],
+    trial: str,
+    facts: Mapping[str, float | None],
+) -> Recording:
+    """A recording whose signals are columns of one table.
+
+    Args:
+        where: the file, for messages.
+        mapping: names the columns.
+        signal: finds one; raises `UserError` where there is none.
+        trial: its name.
+        facts: that the file tells.
+    """
+    return Recording(
+        where=where,
+        trial=trial,
+        time=signal(mapping.time),
+        length=signal(mapping.length),
+        force=None if mapping.force is None else signal(mapping.force),
+        calcium=None if mapping.calcium is None else signal(mapping.calcium),
+        stimulation=None if mapping.stimulation is None else signal(mapping.stimulation.column),
+        facts=facts,
+    )

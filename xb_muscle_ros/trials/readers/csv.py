@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.trials.readers.assembly import trial_of
-from xb_muscle_ros.trials.readers.base import Pending
+from xb_muscle_ros.trials.readers.base import Pending, begin_of, by_columns
 from xb_muscle_ros.trials.readers.columns import FILE
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping
 from xb_muscle_ros.trials.readers.recording import Recording, Signal
@@ -29,10 +29,7 @@ class CsvReader:
         """Whether the file is called so or holds text."""
         if path.suffix.lower() in self.suffixes:
             return True
-        if not path.is_file():
-            return False
-        with path.open("rb") as file:
-            begin = file.read(_LOOKED_AT_BYTES)
+        begin = begin_of(path, _LOOKED_AT_BYTES)
         return bool(begin) and b"\x00" not in begin
 
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
@@ -64,13 +61,4 @@ def read_recording(path: Path, mapping: ImportMapping) -> Recording:
     def signal(column: Column) -> Signal:
         return Signal(f"column '{column.name}'", table.numbers(column.name), lambda i: f"line {table.line(i)}")
 
-    return Recording(
-        where=str(path),
-        trial=mapping.trial_of(path),
-        time=signal(mapping.time),
-        length=signal(mapping.length),
-        force=None if mapping.force is None else signal(mapping.force),
-        calcium=None if mapping.calcium is None else signal(mapping.calcium),
-        stimulation=None if mapping.stimulation is None else signal(mapping.stimulation.column),
-        facts=mapping.facts_of(path),
-    )
+    return by_columns(str(path), mapping, signal, mapping.trial_of(path), mapping.facts_of(path))

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.readers.base import Pending
+from xb_muscle_ros.trials.readers.base import Pending, begin_of
 from xb_muscle_ros.trials.readers.columns import FILE
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping
 from xb_muscle_ros.trials.readers.recording import Recording, Signal
@@ -63,12 +63,7 @@ class MatReader:
 
     def matches(self, path: Path) -> bool:
         """Whether the file begins or is called like one of MATLAB."""
-        if path.suffix.lower() in self.suffixes:
-            return True
-        if not path.is_file():
-            return False
-        with path.open("rb") as file:
-            return file.read(len(_MAGIC[0])) in _MAGIC
+        return path.suffix.lower() in self.suffixes or begin_of(path, len(_MAGIC[0])) in _MAGIC
 
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
         """The measured cells of the file, pCa by pCa; the file is read whole, its trials are made one at a time.

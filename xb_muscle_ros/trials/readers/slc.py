@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.trials.readers.base import Pending
+from xb_muscle_ros.trials.readers.base import Pending, begin_of, by_columns
 from xb_muscle_ros.trials.readers.columns import FILE
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping
 from xb_muscle_ros.trials.readers.recording import Recording, Signal
@@ -50,12 +51,7 @@ class SlcReader:
 
     def matches(self, path: Path) -> bool:
         """Whether the file begins or is called like one of SLControl."""
-        if path.suffix.lower() in self.suffixes:
-            return True
-        if not path.is_file():
-            return False
-        with path.open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC
+        return path.suffix.lower() in self.suffixes or begin_of(path, len(MAGIC)) == MAGIC
 
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
         """The one trial of the file."""
@@ -76,18 +72,8 @@ def _recording(path: Path, mapping: ImportMapping) -> Recording:
             raise UserError(f"{path} has no channel '{column.name}'{suggest(column.name, channels)}")
         return Signal(f"column '{column.name}'", channels[column.name], lambda i: f"line {header.lines + i + 1}")
 
-    return Recording(
-        where=str(path),
-        trial=mapping.trial_of(path),
-        time=signal(mapping.time),
-        length=signal(mapping.length),
-        force=None if mapping.force is None else signal(mapping.force),
-        calcium=None if mapping.calcium is None else signal(mapping.calcium),
-        stimulation=None if mapping.stimulation is None else signal(mapping.stimulation.column),
-        facts=_facts(header, mapping),
-        notes=_notes(header),
-        warnings=_rate_warning(header, columns["time"]),
-    )
+    found = by_columns(str(path), mapping, signal, mapping.trial_of(path), _facts(header, mapping))
+    return replace(found, notes=_notes(header), warnings=_rate_warning(header, columns["time"]))
 
 
 def _calibrated(header: SlcHeader, columns: dict[str, Array]) -> dict[str, Array]:

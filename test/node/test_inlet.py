@@ -1,0 +1,134 @@
+"""The callbacks, without ROS: what is taken, what is refused, and how often one hears of it."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.node.inlet import Inlet
+from xb_muscle_ros.node.inlet_many import InletOfMany
+from xb_muscle_ros.node.inputs import Refusal
+from xb_muscle_ros.node.several import Trouble
+
+FIBRES = ["left", "right", "back"]
+
+
+def message(position: Any, name: Any = (), velocity: Any = ()) -> Any:
+    header = SimpleNamespace(stamp=SimpleNamespace(sec=1, nanosec=5))
+    return SimpleNamespace(header=header, name=list(name), position=list(position), velocity=list(velocity))
+
+
+class Taken:
+    """Keeps what it is given; refuses stamps or fails where it is told to."""
+
+    def __init__(self) -> None:
+        self.length: list[Any] = []
+        self.calcium: list[Any] = []
+        self.error: Refusal | UserError | None = None
+
+    def take_length(self, stamp: int, *values: Any) -> Any:
+        if self.error is not None and isinstance(values[0], float):
+            raise self.error
+        self.length.append((stamp, *(v.tolist() if isinstance(v, np.ndarray) else v for v in values)))
+        return [] if self.error is None else [Trouble(1, self.error)]
+
+    def take_calcium(self, stamp: int, *values: Any) -> Any:
+        self.calcium.append((stamp, *(v.tolist() if isinstance(v, np.ndarray) else v for v in values)))
+        return []
+
+
+@pytest.fixture
+def taken() -> Taken:
+    return Taken()
+
+
+@pytest.fixture
+def one(taken: Taken, notes: Any) -> Inlet:
+    inlet = Inlet("left", taken, notes)
+    inlet.open = True
+    return inlet
+
+
+@pytest.fixture
+def many(taken: Taken, notes: Any) -> InletOfMany:
+    inlet = InletOfMany(FIBRES, taken, notes)
+    inlet.open = True
+    return inlet
+
+
+def test_one_takes_its_own_value(one: Inlet, taken: Taken) -> None:
+    one.take_length(message([0.1, 0.2], ["right", "left"], [0.0, 3.0]))
+    one.take_calcium(message([5.0]))
+    assert taken.length == [(1_000_000_005, 0.2, 3.0)]
+    assert taken.calcium == [(1_000_000_005, 5.0)]
+    assert one.last_length_s is not None
+
+
+def test_many_take_theirs_in_their_order(many: InletOfMany, taken: Taken) -> None:
+    many.take_length(message([0.3, 0.1], ["back", "left"]))
+    many.take_calcium(message([5.0, 6.0, 7.0]))
+    assert taken.length == [(1_000_000_005, [2, 0], [0.3, 0.1], None)]
+    assert taken.calcium == [(1_000_000_005, [0, 1, 2], [5.0, 6.0, 7.0])]
+
+
+@pytest.mark.parametrize("which", ["one", "many"])
+def test_closed_doors_take_nothing(request: pytest.FixtureRequest, taken: Taken, which: str) -> None:
+    inlet = request.getfixturevalue(which)
+    inlet.open = False
+    inlet.take_length(message([math.nan] * 9))
+    inlet.take_calcium(message([math.nan] * 9))
+    assert (taken.length, taken.calcium, inlet.refused) == ([], [], {})
+
+
+@pytest.mark.parametrize("which", ["one", "many"])
+def test_each_reason_is_heard_of_once(request: pytest.FixtureRequest, taken: Taken, notes: Any, which: str) -> None:
+    """And counted each time."""
+    inlet = request.getfixturevalue(which)
+    values = [0.1] if which == "one" else [0.1, 0.2, 0.3]
+    for _ in range(3):
+        inlet.take_length(message([*values, 0.4]))
+        inlet.take_length(message(values, velocity=[0.0, 0.0]))
+        inlet.take_calcium(message([-1.0, *values[1:]]))
+    assert inlet.refused == {"wrong array size": 6, "out of range": 3}
+    size, calcium = notes.lines
+    assert size.startswith("warning length refused (wrong array size, 1 so far): wrong array size: ")
+    whose = "" if which == "one" else " of left"
+    assert calcium.startswith(
+        f"warning calcium{whose} refused (out of range, 1 so far): out of range: calcium is -1 µM"
+    )
+    assert taken.length == []
+    assert len(taken.calcium) == (0 if which == "one" else 3)
+
+
+@pytest.mark.parametrize("which", ["one", "many"])
+def test_velocity_that_is_no_number(request: pytest.FixtureRequest, taken: Taken, which: str) -> None:
+    inlet = request.getfixturevalue(which)
+    inlet.take_length(message([0.1, 0.2], ["left", "right"], [math.nan, 1.0]))
+    assert inlet.refused == {"not finite": 1}
+    assert taken.length == ([] if which == "one" else [(1_000_000_005, [1], [0.2], [1.0])])
+
+
+@pytest.mark.parametrize("which", ["one", "many"])
+def test_strangers_are_news_once(request: pytest.FixtureRequest, notes: Any, which: str) -> None:
+    inlet = request.getfixturevalue(which)
+    for _ in range(2):
+        inlet.take_length(message([0.1, 0.2, 0.3, 0.4, 0.5], ["left", *"abcd"]))
+    assert inlet.ignored_names == 4
+    here = "fibre left" if which == "one" else "fibres left, right, back"
+    assert notes.lines == [f"warning names ignored: a, b, c and 1 more; this node has {here}"]
+
+
+@pytest.mark.parametrize("which", ["one", "many"])
+def test_what_stops_is_an_error_each_time(request: pytest.FixtureRequest, taken: Taken, notes: Any, which: str) -> None:
+    inlet = request.getfixturevalue(which)
+    taken.error = UserError("state q2 is -1")
+    for _ in range(2):
+        inlet.take_length(message([0.1] if which == "one" else [0.1, 0.2, 0.3]))
+    whose = "" if which == "one" else "right "
+    assert notes.lines == [f"error {whose}stopped: state q2 is -1; call ~/reset to start again"] * 2
+    assert inlet.refused == {}
