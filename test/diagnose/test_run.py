@@ -79,7 +79,8 @@ def test_the_json_has_what_users_build_on(drag: tuple[Path, dict[str, Any]]) -> 
     _, found = drag
     wanted = {
         "verdict", "answer", "family", "p_value", "confidence", "mismatch", "conflicts", "kernel", "candidates",
-        "before", "after", "flexible_bound_rmsd_f0", "next_experiment", "augmented_fiber", "summary", "how",
+        "before", "after", "flexible_bound_rmsd_f0", "linear_heldout", "next_experiment", "augmented_fiber",
+        "summary", "how",
     }  # fmt: skip
     assert wanted <= set(found)
     assert {"trial", "phase", "start_s", "end_s", "size_f0", "sign", "p_value"} <= set(found["mismatch"][0])

@@ -65,6 +65,7 @@ def diagnosis(verdict: str, **changes: Any) -> dict[str, Any]:
         "before": {"train_rmsd_f0": 0.021, "heldout_rmsd_f0": 0.022},
         "after": {"train_rmsd_f0": 0.0038, "heldout_rmsd_f0": 0.004}, "start": {"train_rmsd_f0": 0.037},
         "flexible_bound_rmsd_f0": 0.0035,
+        "linear_heldout": {"before_rmsd_f0": 0.022, "after_rmsd_f0": 0.004},
         "next_experiment": {
             "bag": "next_experiment", "protocol": "Stretch at 0.05 and 2 L0/s.",
             "separates": ["viscous_drag", "passive_viscoelasticity"], "expected_difference_f0": 0.012,

@@ -92,6 +92,15 @@ def test_rivals_of_another_family_or_kind_leave_it_open(rival: Name) -> None:
     assert d.family is None
 
 
+def test_what_does_nothing_beside_the_others_is_no_rival() -> None:
+    shift = fit(0.0012, Name.TIME_SHIFT)
+    idle = fit(0.0012, Name.LATTICE_SPACING, Name.TIME_SHIFT)
+    final = fit(0.00118, Name.VISCOUS_DRAG, Name.TIME_SHIFT)
+    search = evidence(final, shift, idle, fit(0.0058, Name.VISCOUS_DRAG)).search
+    assert Name.LATTICE_SPACING not in weights_against(search, Name.VISCOUS_DRAG, len(TRIALS))
+    assert Name.VISCOUS_DRAG in weights_against(search, Name.VISCOUS_DRAG, len(TRIALS))
+
+
 def test_rivals_are_no_answer_where_trials_left_out_are_not_predicted() -> None:
     rival = fit(0.00081, Name.TRANSDUCER_LAG)
     worse = {"base": scores(0.006), "viscous_drag": scores(0.007)}

@@ -12,7 +12,7 @@ from xb_muscle_ros.diagnose.crossval import HeldOut, difference
 from xb_muscle_ros.diagnose.mismatch import Bound
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name, Verdict
 from xb_muscle_ros.diagnose.refit import Fit
-from xb_muscle_ros.diagnose.search import Search
+from xb_muscle_ros.diagnose.search import PENALTY, Search
 from xb_muscle_ros.diagnose.study import Explanation
 
 # Independent differences that a trial tells of, as a rule: residuals of a muscle hang together over a whole phase.
@@ -197,7 +197,11 @@ def weights_against(search: Search, lead: Name, trials: int) -> dict[Name, float
     """
     told = _TOLD_BY_TRIAL * trials
     fits = {lead: search.final}
+    rest = search.fits.get(search.final.explanation.without(lead).label)
     for rival in search.rivals(lead):
+        # What does nothing beside the others is no rival, even if they leave little to do.
+        if rest is not None and rest.cost - rival.cost < 2.0 * PENALTY:
+            continue
         name = next(n for n in rival.explanation.names if n not in search.final.explanation.without(lead).names)
         fits.setdefault(name, rival)
     logs = {}

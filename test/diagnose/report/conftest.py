@@ -184,6 +184,7 @@ def diagnosis_of(study: Study, verdict: str) -> dict[str, Any]:
         "after": {"train_rmsd_f0": overall(after), "heldout_rmsd_f0": overall(heldout)},
         "start": {"train_rmsd_f0": overall(start)},
         "flexible_bound_rmsd_f0": study.flexible(),
+        "linear_heldout": {"before_rmsd_f0": overall(study.left), "after_rmsd_f0": overall(heldout)},
         **words_of(verdict, quiet, bool(answer)),
     }  # fmt: skip
     facts["summary"] = summary_text(facts)
