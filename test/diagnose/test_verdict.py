@@ -128,6 +128,26 @@ def test_no_mechanism_is_named_where_a_condition_fails(against: dict[str, Any]) 
     assert d.answer == ()
 
 
+def uneven(*rmsds: float) -> HeldOut:
+    return HeldOut({name: rmsd**2 for name, rmsd in zip(TRIALS, rmsds, strict=True)}, dict.fromkeys(TRIALS, 1000))
+
+
+def test_held_out_gains_have_to_be_those_of_most_trials() -> None:
+    before = uneven(*[0.004] * 6, 0.02)
+    one_trial = {"base": before, "viscous_drag": uneven(*[0.0041] * 6, 0.008)}
+    assert decide(evidence(DRAG, heldout=one_trial)).verdict is Verdict.UNEXPLAINED
+    most = {"base": before, "viscous_drag": uneven(*[0.001] * 6, 0.019)}
+    assert decide(evidence(DRAG, heldout=most)).verdict is Verdict.PHYSICS
+
+
+def test_a_fault_of_single_trials_may_miss_one_of_them() -> None:
+    drift = fit(0.0008, Name.FORCE_DRIFT)
+    heldout = {"base": uneven(*[0.006] * 6, 0.02), "force_drift": uneven(*[0.004] * 6, 0.03)}
+    assert decide(evidence(drift, interval=None, heldout=heldout, bound=None)).verdict is Verdict.MEASUREMENT
+    worse = {"base": uneven(*[0.006] * 7), "force_drift": uneven(*[0.007] * 7)}
+    assert decide(evidence(drift, interval=None, heldout=worse, bound=None)).verdict is Verdict.UNEXPLAINED
+
+
 def test_half_an_explanation_is_none() -> None:
     d = decide(evidence(fit(0.0045, Name.VISCOUS_DRAG)))
     assert d.verdict is Verdict.UNEXPLAINED

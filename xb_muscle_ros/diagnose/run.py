@@ -109,7 +109,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
     folds = folds_of(study, effort.folds)
 
     def scored(fits: Sequence[Fit]) -> dict[str, HeldOut]:
-        return held_out(study, fits, folds, max(6, effort.most // 2), options) if folds else {}
+        return held_out(study, fits, folds, max(6, effort.most // 3), options) if folds else {}
 
     scores = kept_to_what_foretells(search, scored)
     if detected and search.final is not search.base:
