@@ -1,4 +1,4 @@
-"""Second descents of a search: which explanations get one, from where, and that only a better one counts."""
+"""A search: which explanations are fitted a second time and from where, and when models are compiled."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import Any
 import pytest
 
 from xb_muscle_ros.diagnose import search as searching
+from xb_muscle_ros.diagnose.catalogue import applicable
 from xb_muscle_ros.diagnose.names import Name
-from xb_muscle_ros.diagnose.refit import Fit
+from xb_muscle_ros.diagnose.refit import Fit, compile_task
 from xb_muscle_ros.diagnose.search import QUICK, Searcher
 from xb_muscle_ros.diagnose.study import Explanation, Study
 from xb_muscle_ros.models.fibre_file import load_fibre
@@ -70,3 +71,30 @@ def test_leading_fits_and_swaps_start_anew_from_the_fibre_file(
     assert found["thick_filament_cooperativity"].cost == 60.0
     assert found["lattice_spacing"].cost == 400.0
     assert searcher.fits["active_titin"].values == {"f": 100.0}
+
+
+@pytest.mark.parametrize(("processes", "compiles"), [(2, True), (0, False)])
+def test_models_are_compiled_side_by_side_once(
+    processes: int, compiles: bool, searcher: Searcher, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    searcher.options = Options(processes=processes, quiet=True)
+    asked: list[dict[str, Any]] = []
+
+    def run(function: object, tasks: Sequence[dict[str, Any]], options: Options) -> list[bool]:
+        assert function is compile_task
+        assert options.journal is None
+        asked.extend(tasks)
+        return [True] * len(tasks)
+
+    monkeypatch.setattr(searching, "run", run)
+    monkeypatch.setattr(searching, "screen", lambda study, fit, linear: [])
+    for _ in range(2):
+        assert searcher._screened(fit(100.0), None) == []  # type: ignore[arg-type]
+    names = [task["names"] for task in asked]
+    assert names == ([[e.name.value] for e in applicable("2state_coop")] if compiles else [])
+
+
+def test_an_explanation_without_a_model_is_not_compiled() -> None:
+    plain = Study(load_fibre("18Dec2017a", "2state_coop"), ()).to_json()
+    assert compile_task({"study": plain, "names": ["viscous_drag", "time_shift"]})
+    assert not compile_task({"study": plain, "names": ["thin_filament_cooperativity"]})

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.names import Name
-from xb_muscle_ros.diagnose.study import SCALE, Explanation, Study
+from xb_muscle_ros.diagnose.study import SCALE, Explanation, Study, fibre_with
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.coordinates import fault_coordinates
 from xb_muscle_ros.fit.data import FitTrial
@@ -18,6 +18,7 @@ from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.solve import Objective, descend
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.measurement.faults import FAULTS, Scope
+from xb_muscle_ros.models.muscle import Muscle
 
 Array = npt.NDArray[np.float64]
 
@@ -78,6 +79,20 @@ def refit_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
             t.name: heldout_mse(study, explanation, values, t) for t in study.trials if t.name in held_out
         }
     return row
+
+
+def compile_task(task: Mapping[str, Any]) -> bool:
+    """Compile the model of an explanation, which leaves it in this machine's cache; the task as in `refit_task`.
+
+    Returns:
+        whether there is such a model.
+    """
+    study = Study.from_json(task["study"])
+    try:
+        Muscle(fibre_with(study.fibre, explanation_of(task["names"]).mechanisms, {}))
+    except UserError:
+        return False
+    return True
 
 
 def fit_of(row: Mapping[str, Any]) -> Fit:

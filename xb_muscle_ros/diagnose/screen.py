@@ -86,6 +86,21 @@ def screen(study: Study, fit: Fit, linear: Linear) -> list[Screened]:
     return sorted(found, key=lambda s: np.inf if np.isnan(s.gain) else s.gain, reverse=True)
 
 
+def models(study: Study, explanation: Explanation) -> list[Explanation]:
+    """Explanations whose models `screen` runs for the mechanisms that a fit of one does not have yet."""
+    plain = _without_extras(explanation)
+    return [plain.plus(entry.name) for entry in _entries(study, explanation)]
+
+
+def _entries(study: Study, explanation: Explanation) -> list[Entry]:
+    """Mechanisms that go beside an explanation."""
+    return [
+        entry
+        for entry in applicable(study.fibre.model)
+        if entry.name not in explanation.mechanisms and _goes_with(study, explanation, entry.name)
+    ]
+
+
 def _faults(study: Study, fit: Fit, linear: Linear) -> Iterator[Screened]:
     for name in MEASUREMENT:
         if name in fit.explanation.faults:
@@ -103,9 +118,7 @@ def _mechanisms(study: Study, fit: Fit, linear: Linear) -> Iterator[Screened]:
     plain = _without_extras(fit.explanation)
     problem = study.problem(plain, fit.values)
     force = Training(problem).force(problem.start)
-    for entry in applicable(study.fibre.model):
-        if entry.name in fit.explanation.mechanisms or not _goes_with(study, fit.explanation, entry.name):
-            continue
+    for entry in _entries(study, fit.explanation):
         starts = entry_starts(entry, study.fibre, fit.values)
         if entry.effect is None:
             yield Screened(entry.name, np.nan, tuple(starts))

@@ -11,8 +11,8 @@ import numpy as np
 from xb_muscle_ros.diagnose.catalogue import CATALOGUE
 from xb_muscle_ros.diagnose.closure import closure_error
 from xb_muscle_ros.diagnose.names import Name
-from xb_muscle_ros.diagnose.refit import Fit, fit_of, refit_task
-from xb_muscle_ros.diagnose.screen import Linear, Screened, screen
+from xb_muscle_ros.diagnose.refit import Fit, compile_task, fit_of, refit_task
+from xb_muscle_ros.diagnose.screen import Linear, Screened, models, screen
 from xb_muscle_ros.diagnose.study import Explanation, Study
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.work import Options, run
@@ -105,6 +105,7 @@ class Searcher:
     def __init__(self, study: Study, effort: Effort, options: Options) -> None:
         self.study, self.effort, self.options = study, effort, options
         self.fits: dict[str, Fit] = {}
+        self._compiled: set[str] = set()
 
     def _task(self, explanation: Explanation, starts: Sequence[Mapping[str, float]]) -> dict[str, Any]:
         return {
@@ -175,20 +176,31 @@ class Searcher:
         """
         base = final = self.base()
         linear = Linear.of(self.study, base)
-        screened = screen(self.study, base, linear)
+        screened = self._screened(base, linear)
         found = Search(self.study, base, final, screened, linear, self.fits)
         candidates: Sequence[Screened] = screened
         for step in range(self.effort.steps):
             if not significant(self.study, final):
                 break
             if step > 0:
-                candidates = screen(self.study, final, Linear.of(self.study, final))
+                candidates = self._screened(final, Linear.of(self.study, final))
             better = self._step(final, candidates, step)
             if better is None:
                 break
             final = better
         found.final = self._pruned(final)
         return found
+
+    def _screened(self, fit: Fit, linear: Linear) -> list[Screened]:
+        """Candidates beside a fit, their models compiled side by side first: one takes seconds, and they are many."""
+        wanted = [e for e in models(self.study, fit.explanation) if e.label not in self._compiled]
+        self._compiled.update(e.label for e in wanted)
+        if self.options.processes != 0 and self.options.scheduler is None and len(wanted) > 1:
+            # Finished or not, a run that goes on later may meet an empty cache: not a result to be kept.
+            options = replace(self.options, journal=None, label="compiling")
+            tasks = [{"study": self.study.to_json(), "names": [n.value for n in e.names]} for e in wanted]
+            run(compile_task, tasks, options)
+        return screen(self.study, fit, linear)
 
     def _step(self, final: Fit, candidates: Sequence[Screened], step: int) -> Fit | None:
         """The best fit with one more explanation, or None where none is worth it."""
@@ -218,7 +230,7 @@ class Searcher:
             if rest is None:
                 continue
             linear = Linear.of(self.study, rest)
-            chosen = _promising(screen(self.study, rest, linear), rest.cost, self.effort.rivals, False)
+            chosen = _promising(self._screened(rest, linear), rest.cost, self.effort.rivals, False)
             self.fitted([(rest.explanation.plus(s.name), s.starts) for s in chosen], "rivals")
 
 
