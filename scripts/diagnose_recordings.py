@@ -23,11 +23,11 @@ from recorded_cases import CASES, Case, chosen
 from recorded_figures import write_figure
 from recorded_page import write_page
 
-from xb_muscle_ros.diagnose.closure import by_distribution, closure_error
+from xb_muscle_ros.diagnose.closure import by_distribution
 from xb_muscle_ros.diagnose.mismatch import simulated
 from xb_muscle_ros.diagnose.outcome import Outcome, write
 from xb_muscle_ros.diagnose.plain import as_json
-from xb_muscle_ros.diagnose.refit import Fit, heldout_force
+from xb_muscle_ros.diagnose.refit import heldout_force
 from xb_muscle_ros.diagnose.run import diagnose
 from xb_muscle_ros.diagnose.search import QUICK, Effort, penalised
 from xb_muscle_ros.diagnose.study import Study
@@ -35,7 +35,7 @@ from xb_muscle_ros.distribution.gaussian import Gaussian
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import replaced, write_text
 from xb_muscle_ros.fit.coordinates import parameter_coordinates
-from xb_muscle_ros.fit.data import FitTrial, fit_trials
+from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.run import Settings, fit
 from xb_muscle_ros.models.fibre_file import Fibre
@@ -150,9 +150,9 @@ def predictions(outcome: Outcome, concealed: dict[str, list[Trial]]) -> tuple[li
     fits = {f.explanation.label: f for f in [search.base, outcome.shown, search.final, *ordered[:_RIVALS]]}
     every = [t for group in concealed.values() for t in group]
     unseen = fit_trials(every, [False] * len(every), whole=True)
-    study = Study(outcome.study.fibre, unseen)
-    if outcome.study.closure_f0:
-        study = Study(study.fibre, unseen, closure_error(study, search.base))
+    # By the distribution itself: the Gaussian form's error is known where the base was fitted, not elsewhere.
+    fibre = outcome.study.fibre
+    study = Study(by_distribution(fibre) if fibre.method == Gaussian.name else fibre, unseen)
     groups = [name for name, group in concealed.items() for _ in group]
     rows: list[dict[str, Any]] = []
     arrays: dict[str, Array] = {}
@@ -162,7 +162,7 @@ def predictions(outcome: Outcome, concealed: dict[str, list[Trial]]) -> tuple[li
     for k, trial in enumerate(outcome.study.trials):
         arrays |= {f"s{k}_time_s": trial.force_time_s, f"s{k}_measured_f0": trial.measured_f0}
     for k, (group, trial) in enumerate(zip(groups, unseen, strict=True)):
-        forces = {label: foretold(study, f, trial) for label, f in fits.items()}
+        forces = {label: heldout_force(study, f.explanation, f.values, trial) for label, f in fits.items()}
         arrays |= {f"p{k}_time_s": trial.force_time_s, f"p{k}_measured_f0": trial.measured_f0}
         for key, f in (("before", search.base), ("after", search.final)):
             force = forces[f.explanation.label]
@@ -173,15 +173,6 @@ def predictions(outcome: Outcome, concealed: dict[str, list[Trial]]) -> tuple[li
         }
         rows.append({"trial": trial.name, "tests": group, "rmsd_f0": scores})
     return rows, arrays
-
-
-def foretold(study: Study, f: Fit, trial: FitTrial) -> Array | None:
-    """Force of a concealed trial; where the Gaussian form has no solution, by the distribution."""
-    force = heldout_force(study, f.explanation, f.values, trial)
-    if force is None and study.fibre.method == Gaussian.name:
-        detailed = Study(by_distribution(study.fibre), study.trials)
-        force = heldout_force(detailed, f.explanation, f.values, trial)
-    return force
 
 
 if __name__ == "__main__":
