@@ -143,7 +143,7 @@ def _unexplained(facts: Facts) -> list[Sentence]:
             Piece("A flexible curve without any physics gets the error on trials left out of the fit down to "),
             Piece(f"{percent(bound)} % F0", "flexible_bound"),
             Piece(", so there is something to be found."
-                  if well_below(bound, facts["linear_heldout"]["before_rmsd_f0"]) else
+                  if well_below(bound, (facts["linear_heldout"] or {}).get("before_rmsd_f0")) else
                   ", hardly better than the model: what it learns in some trials does not help in others."),
         ])  # fmt: skip
     out += by_chance(facts, "A difference this large")
