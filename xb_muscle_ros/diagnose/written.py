@@ -43,6 +43,7 @@ _OPTIONAL_GROUPS: Mapping[str, tuple[str, ...]] = {
     "map_after": ("trials", "phases", "rms_f0", "mean_f0", "p_value"),
     "kernel": ("time_constant_s", "scales_with", "gain", "explained", "tau_s", "weight_f0"),
     "profile": ("parameter", "unit", "points", "interval"),
+    "linear_heldout": ("before_rmsd_f0", "after_rmsd_f0"),
     "next_experiment": ("bag", "protocol", "separates", "expected_difference_f0"),
 }
 _SINGLE = (
