@@ -117,7 +117,7 @@ def test_rivals_are_no_answer_where_trials_left_out_are_not_predicted() -> None:
         {"at_bound": True},
         {"heldout": {}},
         {"heldout": {"base": scores(0.006), "viscous_drag": scores(0.007)}},
-        {"bound": Bound(0.006, 0.0045, 0.0001)},
+        {"bound": Bound(0.0016, 0.0014, 0.0001)},
         {"described": False},
     ],
     ids=lambda a: next(iter(a)),
@@ -146,6 +146,19 @@ def test_a_fault_of_single_trials_may_miss_one_of_them() -> None:
     assert decide(evidence(drift, interval=None, heldout=heldout, bound=None)).verdict is Verdict.MEASUREMENT
     worse = {"base": uneven(*[0.006] * 7), "force_drift": uneven(*[0.007] * 7)}
     assert decide(evidence(drift, interval=None, heldout=worse, bound=None)).verdict is Verdict.UNEXPLAINED
+
+
+def test_faults_that_leave_much_are_no_answer() -> None:
+    much = fit(0.0045, Name.FORCE_OFFSET)
+    given = evidence(much, base=0.04, interval=None)
+    assert decide(given).verdict is Verdict.UNEXPLAINED
+    assert decide(evidence(fit(0.0035, Name.FORCE_OFFSET), base=0.04, interval=None)).verdict is Verdict.MEASUREMENT
+
+
+def test_either_way_to_hold_trials_out_may_reach_the_flexible_bound() -> None:
+    ran_away = Bound(1.3 * 0.006, 0.02, 0.001)
+    assert decide(evidence(DRAG, bound=ran_away)).verdict is Verdict.PHYSICS
+    assert decide(evidence(DRAG, bound=Bound(0.0079, 0.0075, -0.01))).verdict is Verdict.UNEXPLAINED
 
 
 def test_half_an_explanation_is_none() -> None:

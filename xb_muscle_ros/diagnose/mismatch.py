@@ -39,11 +39,15 @@ class Bound(NamedTuple):
     after_f0: float
     flexible_f0: float
 
-    @property
-    def share(self) -> float | None:
-        """Of the flexible discrepancy's gain that the explanation reaches; None where that gains nothing."""
+    def share(self, refitted_f0: float) -> float | None:
+        """Of the flexible discrepancy's gain that the explanation reaches; None where that gains nothing.
+
+        Args:
+            refitted_f0: held-out RMSD of refits of the explanation. The better one counts: a fit taken as linear runs
+                away where a shape is hardly known, a refit may get stuck, and neither has seen those trials.
+        """
         most = self.before_f0 - self.flexible_f0
-        return (self.before_f0 - self.after_f0) / most if most > 0.0 else None
+        return (self.before_f0 - min(self.after_f0, refitted_f0)) / most if most > 0.0 else None
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,8 @@ _CLEANED = 0.7
 # A name belongs to the answer if without it this share of the mismatch would come back; a mechanism also has a doing of
 # its own of at least this size, F0, and this share of what the others leave.
 _PART, _OWN_F0, _OWN_SHARE = 0.05, 0.002, 0.4
+# What a fault does to a recording is known, other than the form of a mechanism: it leaves no more than this.
+_FAULTS_LEAVE_F0 = 0.004
 # Of the held-out gain of a discrepancy without physics, an answer reaches this share.
 _OF_FLEXIBLE = 0.5
 # A start whose difference is within this factor of the refitted one needed no refit.
@@ -239,6 +241,9 @@ def _checks(e: Evidence, lead: Name, share: float, weights: Mapping[Name, float]
         checks.append(
             Check("its parameter is off its bounds", not e.at_bound, "at a bound" if e.at_bound else "inside")
         )
+    else:
+        left = e.search.final.rmsd_f0
+        checks.append(Check("faults leave next to nothing", left <= _FAULTS_LEAVE_F0, f"{100.0 * left:.2f} % F0"))
     checks += _heldout_checks(e, physics)
     return tuple(checks)
 
@@ -260,7 +265,7 @@ def _heldout_checks(e: Evidence, physics: bool) -> list[Check]:
             f"{100 * base.rmsd_f0:.2f} to {100 * after.rmsd_f0:.2f} % F0, {gain.delta_elpd:.1f} ± {gain.se:.1f}",
         )
     ]
-    of_flexible = e.bound.share if e.bound is not None else None
+    of_flexible = e.bound.share(after.rmsd_f0) if e.bound is not None else None
     if of_flexible is not None:
         found.append(
             Check(
