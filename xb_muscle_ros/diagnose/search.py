@@ -107,19 +107,24 @@ class Searcher:
         self.fits: dict[str, Fit] = {}
         self._compiled: set[str] = set()
 
-    def _task(self, explanation: Explanation, starts: Sequence[Mapping[str, float]]) -> dict[str, Any]:
-        return {
-            "study": self.study.to_json(),
-            "names": [n.value for n in explanation.names],
-            "starts": [dict(s) for s in starts],
-            "held_out": [],
-            "most": self.effort.most,
-            "predict": False,
-        }
+    def _tasks(self, wanted: Sequence[tuple[Explanation, Sequence[Mapping[str, float]]]]) -> list[dict[str, Any]]:
+        """Tasks for `refit_task`; the study, which is long, is written out once for all of them."""
+        plain = self.study.to_json()
+        return [
+            {
+                "study": plain,
+                "names": [n.value for n in explanation.names],
+                "starts": [dict(s) for s in starts],
+                "held_out": [],
+                "most": self.effort.most,
+                "predict": False,
+            }
+            for explanation, starts in wanted
+        ]
 
     def fitted(self, wanted: Sequence[tuple[Explanation, Sequence[dict[str, float]]]], label: str) -> list[Fit]:
         """Fits of explanations, each from its starts; those without a solution are left out."""
-        tasks = [self._task(e, starts) for e, starts in wanted if e.label not in self.fits]
+        tasks = self._tasks([(e, starts) for e, starts in wanted if e.label not in self.fits])
         for row in run(refit_task, tasks, replace(self.options, label=label)):
             if row is not None:
                 fit = fit_of(row)
@@ -137,14 +142,14 @@ class Searcher:
         again = [*order[: self.effort.anew], *(f for f in swapped if f not in order[: self.effort.anew])]
         own = {c.label for c in self.study.problem(Explanation(), {}).coordinates}
         found = {f.explanation.label: f for f in fits}
-        tasks = []
+        wanted = []
         for fit in again:
             starts: list[dict[str, float]] = [{k: v for k, v in fit.values.items() if k not in own}]
             if len(fit.explanation.mechanisms) == 1:
                 entry = CATALOGUE[fit.explanation.mechanisms[0]]
                 starts += [dict(values) for values in entry.starting_values(self.study.fibre.values)]
-            tasks.append(self._task(fit.explanation, starts))
-        for row in run(refit_task, tasks, replace(self.options, label="once more")):
+            wanted.append((fit.explanation, starts))
+        for row in run(refit_task, self._tasks(wanted), replace(self.options, label="once more")):
             if row is not None and (fit := fit_of(row)).cost < found[fit.explanation.label].cost:
                 found[fit.explanation.label] = self.fits[fit.explanation.label] = fit
         return list(found.values())
@@ -198,7 +203,8 @@ class Searcher:
         if self.options.processes != 0 and self.options.scheduler is None and len(wanted) > 1:
             # Finished or not, a run that goes on later may meet an empty cache: not a result to be kept.
             options = replace(self.options, journal=None, label="compiling")
-            tasks = [{"study": self.study.to_json(), "names": [n.value for n in e.names]} for e in wanted]
+            plain = self.study.to_json()
+            tasks = [{"study": plain, "names": [n.value for n in e.names]} for e in wanted]
             run(compile_task, tasks, options)
         return screen(self.study, fit, linear)
 
