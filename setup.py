@@ -55,6 +55,7 @@ setup(
             "distributed",
             "mujoco",
             "pytest",
+            "pytest-xdist",
             "hypothesis",
             "ruff",
             "mypy",
