@@ -83,6 +83,17 @@ def tangent_sinh(z: Expr) -> Expr:
     return TangentSinh(z)
 
 
+def limited(z: Expr) -> Expr:
+    """Z up to 12, levelling off at 15 beyond."""
+    if _numeric(z):
+        from xb_muscle_ros.models.intrinsics import limited as compute
+
+        return float(compute(z))
+    from xb_muscle_ros.models.symbols import Limited
+
+    return Limited(z)
+
+
 def deviation(variance: Expr) -> Expr:
     """Standard deviation of a variance that numerical error may have carried to zero or below.
 

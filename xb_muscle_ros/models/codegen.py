@@ -25,6 +25,8 @@ from xb_muscle_ros.models.intrinsics import (
     decay,
     deviation,
     hyperbolic_tangent,
+    limited,
+    limited_slope,
     logistic,
     positive_part,
     smooth_series_extension,
