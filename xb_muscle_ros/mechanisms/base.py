@@ -296,7 +296,8 @@ class Series(Mechanism):
     """What lies between the contractile element and the end of the fibre.
 
     Cross-bridges carry the force in their states: `ce_velocity` and `extension` follow from it. Where the contractile
-    element has no such state, the series element's own length is one (`length_states`), and `balance` applies.
+    element has no such state, the series element's own length is one (`length_states`), and `balance` applies. A block
+    whose length does not follow from force has it among its `states`, and says `force` and `derivatives`.
     """
 
     family = Family.SERIES
@@ -312,6 +313,14 @@ class Series(Mechanism):
     @abstractmethod
     def extension(self, q: Quantities) -> Expr:
         """Length of the series element at the force ``q.force_xb``, power strokes."""
+
+    def force(self, q: Quantities) -> Expr:
+        """What it bears, cross-bridge force; that of the heads, ``q.force_xb``, where it has no states."""
+        return q.force_xb
+
+    def derivatives(self, q: Quantities) -> Mapping[str, Expr]:
+        """Rates of change of its states; ``q.ce_velocity`` (power strokes/s) is among the names."""
+        return {}
 
     @abstractmethod
     def balance(self, q: Quantities, element: Contractile) -> Balance:

@@ -127,6 +127,15 @@ def positive(z: Expr) -> Expr:
     return Positive(z)
 
 
+def above(z: Expr) -> Expr:
+    """1 where z > 0, else 0."""
+    if _numeric(z):
+        return 1.0 if z > 0.0 else 0.0
+    from xb_muscle_ros.models.symbols import UnitStep
+
+    return UnitStep(z)
+
+
 def smooth_series_extension(force: Expr, kse0: Expr, sharpness: Expr) -> Expr:
     """Integral of dF/(softplus(F, sharpness) + kse0) from 0 to force: extension times kse of the smoothed spring."""
     if _numeric(force, kse0, sharpness):
