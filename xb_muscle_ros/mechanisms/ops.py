@@ -49,9 +49,9 @@ def tanh(z: Expr) -> Expr:
     """Hyperbolic tangent."""
     if _numeric(z):
         return math.tanh(z)
-    import sympy
+    from xb_muscle_ros.models.symbols import HyperbolicTangent
 
-    return sympy.tanh(z)
+    return HyperbolicTangent(z)
 
 
 def erf(z: Expr) -> Expr:

@@ -72,7 +72,10 @@ def tangent_cosh(z: float) -> float:
 @njit(cache=True)
 def limited(z: float) -> float:
     """Z up to 12, levelling off at 15 beyond."""
-    return z if z < 12.0 else 12.0 + 3.0 * hyperbolic_tangent((z - 12.0) / 3.0)
+    if z < 12.0:
+        return z
+    t: float = hyperbolic_tangent((z - 12.0) / 3.0)
+    return 12.0 + 3.0 * t
 
 
 @njit(cache=True)
@@ -80,7 +83,7 @@ def limited_slope(z: float) -> float:
     """Derivative of `limited`."""
     if z < 12.0:
         return 1.0
-    t = hyperbolic_tangent((z - 12.0) / 3.0)
+    t: float = hyperbolic_tangent((z - 12.0) / 3.0)
     return 1.0 - t * t
 
 

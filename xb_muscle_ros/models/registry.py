@@ -266,6 +266,21 @@ def model_of_set(name: str, where: str = "") -> str:
     return split_set(name, where)[0]
 
 
+def slack_of(name: str) -> str | None:
+    """Set or model of the same blocks whose series spring goes slack; None where it does already.
+
+    Raises:
+        UserError: see `split_set`.
+    """
+    model, version = split_set(name)
+    stem, *mechanisms = model.split(SEPARATOR)
+    if row_of(model).series is SlackSeries:
+        return None
+    wanted = MODELS[stem]._replace(series=SlackSeries)
+    slack = next(known for known, row in MODELS.items() if row == wanted)
+    return with_mechanisms(slack + version, *mechanisms)
+
+
 def compose(model: str, method: str = "gaussian") -> Model:
     """Build the named model for the named method.
 

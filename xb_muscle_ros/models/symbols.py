@@ -64,6 +64,16 @@ class Positive(sympy.Function):
         return UnitStep(self.args[0])
 
 
+class HyperbolicTangent(sympy.Function):
+    """tanh(z). SymPy's own asks at every turn whether its argument is real, which took a quarter of the time."""
+
+    nargs = 1
+
+    def fdiff(self, argindex: int = 1) -> Any:
+        """d/dz."""
+        return 1 - self**2
+
+
 class TangentCosh(sympy.Function):
     """cosh(z) up to |z| = 12, constant beyond: the derivative of `TangentSinh`. Never differentiated itself."""
 
@@ -126,7 +136,7 @@ CALLS = {
     "Softplus": "softplus",
     "UnitStep": "unit_step",
     "Positive": "positive_part",
-    "tanh": "hyperbolic_tangent",
+    "HyperbolicTangent": "hyperbolic_tangent",
     "TangentSinh": "tangent_sinh",
     "TangentCosh": "tangent_cosh",
     "Deviation": "deviation",
