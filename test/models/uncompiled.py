@@ -62,6 +62,7 @@ class Uncompiled:
     def __init__(self, model: Model, values: dict[str, float]) -> None:
         self.code = uncompiled(model, values["smoothing"] > 0.0)
         self.p = self.code.prepare(np.array([values[row.name] for row in model.parameters]))
+        self.rows = model.parameters
         self.n = len(model.state_rows(values)) + 3
         self.names = [row.name for row in model.state_rows(values)]
         self.work = np.zeros((SCRATCH_ROWS, self.n))
