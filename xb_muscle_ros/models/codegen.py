@@ -73,7 +73,14 @@ def flat_module(model: Model, smooth: bool) -> str:
     shared = program(_rates(e), "t")
     prepare = function("prepare(p)", "Parameters and what is computed from them once.", ["return p.copy()"])
     stay = function("regrid(s, p, work)", "Moments need no grid.", ["pass"])
-    parts = [header(model, smooth, ros3.ORDER, interpolated=True), prepare, stay, _rhs(e, shared), _attempt(e, shared), _slope(e)]
+    parts = [
+        header(model, smooth, ros3.ORDER, interpolated=True),
+        prepare,
+        stay,
+        _rhs(e, shared),
+        _attempt(e, shared),
+        _slope(e),
+    ]
     parts += [vector("rest", e.parameters, e.rest), _outputs(e), _violation(e, smooth)]
     return "\n\n".join(parts) + "\n\n\n" + kernels() + "\n"
 
