@@ -48,6 +48,6 @@ def test_a_failing_simulation_names_its_trial(muscle: Muscle) -> None:
 
 
 def test_naming_keeps_the_kind_of_error_and_its_facts() -> None:
-    with pytest.raises(StateViolation, match="^trial x: fibre f: state q0 became 2") as caught, naming("trial x"):
+    with pytest.raises(StateViolation, match=r"^trial x: fibre f: state q0 became 2") as caught, naming("trial x"):
         raise StateViolation("f", "q0", 0.1, 2.0, "0 to 1", "check")
     assert (caught.value.state, caught.value.time_s) == ("q0", 0.1)
