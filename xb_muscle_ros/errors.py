@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 
 class UserError(Exception):
@@ -35,6 +36,16 @@ class StateViolation(UserError):
         self.state = state
         self.time_s = time_s
         self.value = value
+
+
+@contextlib.contextmanager
+def naming(what: str) -> Iterator[None]:
+    """Put what was at work before the message of an error that comes out of the block: ``trial x: fibre y: ...``."""
+    try:
+        yield
+    except UserError as error:
+        error.args = (f"{what}: {error}",)
+        raise
 
 
 def suggest(word: str, known: Iterable[str]) -> str:

@@ -66,7 +66,7 @@ def test_compiled_right_hand_side_is_the_blocks_own(
     values |= {e.symbols[name]: value for name, value in muscle.fibre.values.items()}
     values |= {e.shift: z[5], e.symbols["velocity"]: velocity, e.symbols["calcium"]: calcium}
     from xb_muscle_ros.mechanisms import ops
-    from xb_muscle_ros.models.symbols import Decay, Logistic, Positive, Softplus
+    from xb_muscle_ros.models.symbols import Decay, HyperbolicTangent, Logistic, Positive, Softplus
 
     ours = np.zeros(6)
     muscle.code.rhs(z, velocity, calcium, muscle.parameters, ours)
@@ -76,10 +76,11 @@ def test_compiled_right_hand_side_is_the_blocks_own(
             "Softplus": lambda v, k, _: ops.softplus(v, k),
             "Logistic": lambda v, k, _: 1.0 / (1.0 + np.exp(-k * v)),
             "Positive": ops.positive,
+            "HyperbolicTangent": np.tanh,
         },
         "math",
     ]
-    assert {f.__name__ for f in (Decay, Softplus, Positive, Logistic)} == set(plain[0])
+    assert {f.__name__ for f in (Decay, Softplus, Positive, Logistic, HyperbolicTangent)} == set(plain[0])
     symbols = list(values)
     theirs = sympy.lambdify(symbols, e.derivatives[:-1], plain)(*(float(v) for v in values.values()))
     np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * max(1.0, float(np.abs(theirs).max())))
@@ -115,10 +116,11 @@ def test_violation_names_fibre_state_value_and_time(muscle: Muscle) -> None:
         muscle.step(state, 0.0, 1.0, 1e-3)
 
 
-def test_nan_input_is_a_violation_not_a_number(muscle: Muscle) -> None:
+def test_a_state_that_is_not_a_number_is_a_violation(muscle: Muscle) -> None:
     state = muscle.settle(0.0, 1.0)
-    with pytest.raises(StateViolation):
-        muscle.step(state, float("nan"), 1.0, 1e-3)
+    state[0] = float("nan")
+    with pytest.raises(StateViolation, match="q0"):
+        muscle.step(state, 0.0, 1.0, 1e-3)
 
 
 @given(

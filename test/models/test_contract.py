@@ -45,6 +45,8 @@ CROSS_BRIDGES = [m for m in MODELS if BASE_OF[m] == m and isinstance(compose(m),
 CASES = [(m, k, 0.0) for m in CROSS_BRIDGES for k in METHODS]
 # The smooth functions of the released sets, with the method they were released for.
 CASES += [(m, "gaussian", 100.0) for m in ("2state", "3state_coop", "4state_coop")]
+# Bins with smoothing, and a spring that goes slack; every mechanism with both: see `test_every_mechanism`.
+CASES += [("3state_coop", "characteristics", 100.0), ("3state_coop_slack", "gaussian", 0.0)]
 # Nothing to smooth and no distribution in Hill-type models. Of the elastic variants a few stand for all: see the last
 # test here.
 CASES += [(m, "gaussian", 0.0) for m in ("hill_se", "hill", "hill_softplus", "3state_coop_rigid")]
@@ -135,12 +137,13 @@ def test_both_elements_bear_the_same_force(muscle: Muscle) -> None:
             assert out.ce_length_change_l0 == state[-3]
             assert out.ce_velocity_l0_per_s == pytest.approx(state[-2], rel=1e-14)
             continue
+        if "l_se" in muscle.state_names:
+            # Slack bears nothing.
+            extension = max(extension, 0.0)
         if "vmax" in v:
             # A third way to the force: by the velocity of the contractile element.
             y = v["e2"] * v["gamma"] * out.ce_velocity_l0_per_s / v["vmax"] + v["e3"]
             assert force_xb == pytest.approx(out.n_on * (v["e1"] * np.arcsinh(y) + v["e4"]), abs=1e-9)
-            # Slack bears nothing.
-            extension = max(extension, 0.0)
         if v["smoothing"] == 0.0:
             series = v["kse0"] * np.expm1(v["kse"] * extension) if extension > 0.0 else v["kse"] * v["kse0"] * extension
             assert abs(series - force_xb) < 1e-12
@@ -305,11 +308,13 @@ def test_variants_differ_from_their_base_in_the_one_element_only(model: str) -> 
     if not isinstance(base, Composition):
         return
     e, b = ours.equations(False), base.equations(False)
-    velocity = len(e.states)
-    assert e.derivatives[:velocity] == b.derivatives[:velocity]
-    expected = e.symbols["gamma"] * e.symbols["velocity"] if "rigid" in model else b.derivatives[velocity]
-    assert e.derivatives[velocity] == expected
-    assert (e.arrival, e.rest) == (b.arrival, b.rest)
+    same = len(b.states)
+    # A spring that goes slack has its length as one more state, behind the others.
+    assert [s.name for s in e.states[same:]] == (["l_se"] if "slack" in model else [])
+    assert e.derivatives[:same] == b.derivatives[:same]
+    expected = e.symbols["gamma"] * e.symbols["velocity"] if "rigid" in model else b.derivatives[same]
+    assert (e.derivatives[len(e.states)] == expected) == ("slack" not in model)
+    assert (e.arrival[:same], e.rest[:same]) == (b.arrival, b.rest)
     names = {row.name for row in ours.parameters}
     assert ("kse" in names) == ("rigid" not in model)
     assert ("lpe0" in names) == ("softplus" in model) == ("Fpe0" not in names)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 import pytest
+from mechanism_effects import EFFECT
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.composition import Composition
@@ -20,21 +20,6 @@ BASE = "3state_coop"
 TIME = np.arange(501) * 1e-3
 # Stretch, shortening back, stretch, hold: 3.83 % L0 at the paper's speed.
 LENGTH = np.interp(TIME, [0.0, 0.05, 0.134, 0.218, 0.228, 0.312, 0.5], [0.0, 0.0, 0.0383, 0.0, 0.0, 0.0383, 0.0383])
-EFFECT: Mapping[str, Mapping[str, float]] = {
-    "viscous_drag": {"drag": 0.01},
-    "passive_viscoelasticity": {"pv_stiffness": 1.0, "pv_tau": 0.05, "pv_ratio": 0.5},
-    "weakly_bound_heads": {"weak_stiffness": 40.0, "weak_detachment": 500.0},
-    "active_titin": {"titin_stiffness": 2.0, "titin_calcium": 0.5},
-    "static_calcium_stiffness": {"calcium_stiffness": 2.0, "stiffness_calcium": 0.5},
-    "length_dependent_activation": {"calcium_per_length": 2.0},
-    "lattice_spacing": {"attachment_per_length": 2.0},
-    "filament_overlap": {"overlap_per_length": -2.0},
-    "strain_recruited_heads": {"strain_recruitment": 150.0},
-    "nonlinear_crossbridge": {"head_curvature": 0.1},
-    "half_sarcomere_spread": {"hs_spread": 0.1},
-    "temperature": {"warmer": 5.0},
-    "phosphate": {"phosphate_detachment": 5.0},
-}
 
 
 def fibre_with(mechanism: str | None, method: str = "gaussian", base: str = BASE, **values: float) -> Fibre:

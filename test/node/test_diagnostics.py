@@ -80,3 +80,35 @@ def test_account_can_be_read_back() -> None:
     account = Account(100, 7, 1)
     assert Account.read(f"state forgotten after {account}; the next one settles") == account
     assert Account.read("nothing of the kind") is None
+
+
+@pytest.mark.usefixtures("domain")
+def test_a_fibre_that_pushes_is_a_warning_until_the_next_report() -> None:
+    """The strongest push since the last report, by fibre, whether there is one fibre or many."""
+    from types import SimpleNamespace
+
+    import numpy as np
+    from diagnostic_msgs.msg import DiagnosticStatus
+
+    from xb_muscle_ros.models.muscle import Outputs
+    from xb_muscle_ros.node.inputs import Scale
+    from xb_muscle_ros.node.outputs import OutputMessages, OutputMessagesMany
+
+    nowhere: Any = SimpleNamespace(publish=lambda message: None, get_subscription_count=lambda: 0)
+    one = OutputMessages("soleus", nowhere, nowhere)
+    for force_f0 in (0.5, -0.2, -0.54, -0.1, -1e-5):
+        one.publish(0, Outputs(force_f0, *([0.0] * 10)), Scale(1.0, 1.0))
+    assert one.pushed == ("soleus", -0.54)
+    many = OutputMessagesMany(["a", "b"], nowhere, nowhere)
+    table = np.zeros((2, 11))
+    many.publish(0, None, table, np.ones((2, 2)))
+    assert many.pushed is None
+    table[1, 0] = -0.3
+    many.publish(0, None, table, np.ones((2, 2)))
+    table[1, 0] = -0.1
+    many.publish(0, None, table, np.ones((2, 2)))
+    assert many.pushed == ("b", -0.3)
+    told = status_of(model="3state_coop", pushed=one.pushed)
+    assert told.level == DiagnosticStatus.WARN
+    assert told.message == "soleus pushes, -0.54 F0, where a muscle would be slack (model 3state_coop_slack does not)"
+    assert status_of(model="3state_coop").message == "stepping"

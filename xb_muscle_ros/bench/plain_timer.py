@@ -41,7 +41,8 @@ class PlainTimer(Node):
         self._period = round(1e9 / float(self.get_parameter("rate_hz").value))
         newest = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
         force, moments = (self.create_publisher(JointState, f"muscle/{topic}", 100) for topic in ("force", "moments"))
-        self._emit = OutputMessages(fibre.name, force, moments).publish
+        outlet = OutputMessages(fibre.name, force, moments)
+        self._emit = outlet.publish
         inlet = Inlet(fibre.name, self, self.get_logger())
         inlet.open = True
         self.create_subscription(JointState, "muscle/calcium", inlet.take_calcium, newest)
@@ -54,7 +55,7 @@ class PlainTimer(Node):
         self._ticks = 0
         self._forget()
         self._reporter = Reporter(self, "plain timer")
-        self._reporter.watch([fibre], self, inlet)
+        self._reporter.watch([fibre], self, inlet, outlet)
         self.create_service(Trigger, "~/reset", self._on_reset)
         # Steady, so that it is not worse for another reason than the one in question.
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)

@@ -33,6 +33,7 @@ def add(subparsers: Subparsers) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Replay, print the table, write the files."""
     from xb_muscle_ros.errors import UserError
+    from xb_muscle_ros.replay.offline import pushing
     from xb_muscle_ros.replay.run import Player, replay, write_results
     from xb_muscle_ros.trials.bags import find_bags, read_trial
 
@@ -58,6 +59,10 @@ def run(arguments: argparse.Namespace) -> int:
 
         player = play_live
     results = replay(trials, fibre, player, arguments.substeps, arguments.settle)
+    for trial, simulated in zip(trials, results.simulated, strict=True):
+        told = pushing(trial, simulated, fibre.model)
+        if told:
+            warn(told)
     print(results.table)
     for path in write_results(arguments.out, trials, results):
         print(path)

@@ -8,10 +8,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_fibre, fibre_of
+from xb_muscle_ros.cli.common import add_fibre, fibre_of, warn
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
+
+# Options that are numbers, and what their ranges go by.
+_NUMBERS = {
+    "pca": "pca",
+    "amplitude": "amplitude_l0",
+    "recovery": "recovery_s",
+    "rate": "rate_hz",
+    "settle": "settle_s",
+}
 
 
 def add(subparsers: Subparsers) -> None:
@@ -45,27 +54,27 @@ def add(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate and write."""
-    from xb_muscle_ros.errors import UserError
+    from xb_muscle_ros.errors import naming
     from xb_muscle_ros.models.muscle import Muscle
-    from xb_muscle_ros.replay.offline import as_simulated
+    from xb_muscle_ros.replay.offline import as_simulated, pushing
     from xb_muscle_ros.trials.bags import write_trial
-    from xb_muscle_ros.trials.protocol import StretchShortenStretch
+    from xb_muscle_ros.trials.protocol import ALLOWED, StretchShortenStretch
 
+    for option, name in _NUMBERS.items():
+        value = getattr(arguments, option)
+        for number in value if isinstance(value, list) else [] if value is None else [value]:
+            ALLOWED[name].check(f"--{option}", number)
     fibre = fibre_of(arguments)
-    if not 1.0 <= arguments.rate <= 1e6:
-        raise UserError(f"--rate is {arguments.rate:g} 1/s; allowed is 1 to 1e6")
-    for pca in arguments.pca:
-        if not 3.0 <= pca <= 12.0:
-            raise UserError(f"--pca is {pca:g}; allowed is 3 to 12")
     muscle = Muscle(fibre)
     for pca, amplitude, recovery in itertools.product(arguments.pca, arguments.amplitude, arguments.recovery):
         protocol = StretchShortenStretch(amplitude, recovery)
         trial = protocol.trial(fibre.name, pca, arguments.rate)
         calcium = float(trial.calcium_um[0])
         corner_s, corner_l0 = protocol.corners()
-        state = muscle.settle(0.0, calcium, arguments.settle)
-        # Variable steps from corner to corner: the protocol itself, not its samples.
-        states = muscle.follow(state, corner_s, corner_l0, 0.0 * corner_s + calcium, trial.time_s)
+        with naming(f"trial {trial.facts.trial}"):
+            state = muscle.settle(0.0, calcium, arguments.settle)
+            # Variable steps from corner to corner: the protocol itself, not its samples.
+            states = muscle.follow(state, corner_s, corner_l0, 0.0 * corner_s + calcium, trial.time_s)
         simulated = as_simulated(muscle, trial, trial.time_s, states)
         source = f"simulated: fibre {fibre.name}, model {fibre.model}, method {fibre.method}"
         trial = replace(trial, facts=replace(trial.facts, source=source))
@@ -74,5 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
         path = arguments.out / f"{arguments.prefix}_{fibre.name}_{trial.facts.trial}"
         write_trial(path, trial, simulated)
         low, high = simulated.force_n.min(), simulated.force_n.max()
+        told = pushing(trial, simulated, fibre.model)
+        if told:
+            warn(told)
         print(f"{path}: {trial.time_s.size} samples, force {low:.3f} to {high:.3f} F0")
     return 0

@@ -20,6 +20,7 @@ from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.screen import Linear
 from xb_muscle_ros.diagnose.significance import Significance, significance
 from xb_muscle_ros.diagnose.study import Study
+from xb_muscle_ros.errors import naming
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.trials.trial import Trial
 
@@ -154,8 +155,9 @@ def _scalings(study: Study, linear: Linear) -> dict[str, list[Array]]:
     muscle = Muscle(linear.problem.fibre_at(linear.problem.start))
     activation, calcium, force = [], [], []
     for trial in study.trials:
-        state = muscle.settle(float(trial.length_l0[0]), float(trial.calcium_um[0]))
-        out = muscle.outputs_of(muscle.run(state, trial.dt_s, trial.length_l0, trial.calcium_um))
+        with naming(f"trial {trial.name}"):
+            state = muscle.settle(float(trial.length_l0[0]), float(trial.calcium_um[0]))
+            out = muscle.outputs_of(muscle.run(state, trial.dt_s, trial.length_l0, trial.calcium_um))
         activation.append(np.interp(trial.force_time_s, trial.time_s, out["n_on"]))
         force.append(np.interp(trial.force_time_s, trial.time_s, out["force_ce_f0"]))
         given = np.interp(trial.force_time_s, trial.time_s, trial.calcium_um)

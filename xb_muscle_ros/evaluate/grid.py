@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.errors import UserError, naming
 from xb_muscle_ros.evaluate.sets import ModelSet, fibre_to_task, muscle_of_task
 from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable, place
 from xb_muscle_ros.models.fibre_file import Fibre
@@ -77,7 +77,11 @@ def simulate(task: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         UserError, StateViolation: see `Muscle.settle` and `Muscle.step`.
     """
-    muscle = muscle_of_task(task["fibre"])
+    with naming(f"simulation at pCa {task['pca']:g}"):
+        return _simulated(muscle_of_task(task["fibre"]), task)
+
+
+def _simulated(muscle: Muscle, task: Mapping[str, Any]) -> dict[str, Any]:
     calcium = 10.0 ** (6.0 - task["pca"])
     settled = muscle.settle(0.0, calcium, task["settle_s"])
     recoveries = np.array(task["recoveries_s"])

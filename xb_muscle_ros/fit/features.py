@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.errors import UserError, naming
 from xb_muscle_ros.evaluate.grid import onset_stiffness, stretched_and_back, waited
 from xb_muscle_ros.models.muscle import Muscle
 
@@ -79,20 +79,21 @@ def simulated(muscle: Muscle, features: Sequence[Feature], shifts: Mapping[float
     out = np.empty(len(features))
     for pca in dict.fromkeys(f.pca for f in features):
         calcium = 10.0 ** (6.0 - pca - (shifts or {}).get(pca, 0.0))
-        settled = muscle.settle(0.0, calcium)
-        conditioned: dict[float, Array] = {0.0: settled}
-        for i, f in enumerate(features):
-            if f.pca != pca:
-                continue
-            if f.kind == "isometric_force":
-                out[i] = muscle.outputs(settled).force_f0
-            elif f.kind == "srs_conditioning":
-                out[i] = onset_stiffness(muscle, settled, calcium)
-            else:
-                if f.amplitude_l0 not in conditioned:
-                    conditioned[f.amplitude_l0] = stretched_and_back(muscle, settled, f.amplitude_l0, calcium)
-                recovered = waited(muscle, conditioned[f.amplitude_l0], f.recovery_s, calcium)
-                out[i] = onset_stiffness(muscle, recovered, calcium)
+        with naming(f"features at pCa {pca:g}"):
+            settled = muscle.settle(0.0, calcium)
+            conditioned: dict[float, Array] = {0.0: settled}
+            for i, f in enumerate(features):
+                if f.pca != pca:
+                    continue
+                if f.kind == "isometric_force":
+                    out[i] = muscle.outputs(settled).force_f0
+                elif f.kind == "srs_conditioning":
+                    out[i] = onset_stiffness(muscle, settled, calcium)
+                else:
+                    if f.amplitude_l0 not in conditioned:
+                        conditioned[f.amplitude_l0] = stretched_and_back(muscle, settled, f.amplitude_l0, calcium)
+                    recovered = waited(muscle, conditioned[f.amplitude_l0], f.recovery_s, calcium)
+                    out[i] = onset_stiffness(muscle, recovered, calcium)
     return out
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from xb_muscle_ros.errors import naming
 from xb_muscle_ros.fit import features
 from xb_muscle_ros.fit.coordinates import Coordinate, from_json, to_json
 from xb_muscle_ros.fit.correction import Correction
@@ -86,9 +87,10 @@ class Problem:
             calcium = given_calcium(trial.calcium_um, faults)
             # Trials that begin alike settle alike, which on a strain grid is most of the work.
             begin = (float(length[0]), float(calcium[0]))
-            if begin not in settled:
-                settled[begin] = muscle.settle(*begin)
-            states = muscle.run(settled[begin], trial.dt_s, length, calcium)
+            with naming(f"trial {trial.name}"):
+                if begin not in settled:
+                    settled[begin] = muscle.settle(*begin)
+                states = muscle.run(settled[begin], trial.dt_s, length, calcium)
             force = muscle.outputs_of(states)["force_f0"]
             found.append(force if self.correction is None else force + self.correction.of_trial(trial.name, z))
         return found

@@ -114,8 +114,9 @@ class Quantities:
     with smooth functions; without smoothing they are exact.
     """
 
-    # Fewer attached heads than this fraction carry no force worth a digit; it keeps Q1/Q0 defined at rest.
-    EMPTY = 1e-9
+    # Fewer attached heads than this fraction carry no force worth a digit, and are less than the error of a fixed step;
+    # it keeps Q1/Q0 defined at rest, and where a quick movement has taken all heads off and left rounding behind.
+    EMPTY = 1e-7
 
     def __init__(self, values: Mapping[str, Expr], block: str, smoothing: Expr | None) -> None:
         self._values = dict(values)
@@ -154,10 +155,12 @@ class Quantities:
         return ops.positive(z) if self._smoothing is None else ops.softplus(z, self._smoothing)
 
     def divisor(self, q0: Expr) -> Expr:
-        """Attached fraction as a divisor."""
+        """Attached fraction as a divisor: never less than `EMPTY`, and within (EMPTY/Q0)²/2 of itself above."""
         from xb_muscle_ros.mechanisms import ops
 
-        return q0 + self.EMPTY if self._smoothing is None else ops.softplus(q0, self._smoothing)
+        if self._smoothing is None:
+            return ops.sqrt(ops.positive(q0) ** 2 + self.EMPTY**2)
+        return ops.softplus(q0, self._smoothing)
 
     def variance(self, z: Expr) -> Expr:
         """Variance of the strain distribution."""
@@ -166,10 +169,15 @@ class Quantities:
         return z if self._smoothing is None else ops.softplus(z, self._smoothing)
 
     def limit(self, exponent: Expr) -> Expr:
-        """Exponent of a detachment moment, limited to ±10 in the released sets."""
+        """Exponent of a detachment moment, limited to ±10 in the released sets.
+
+        Exact ones level off above 12. A rate grows 160,000-fold until then, and heads are gone within a microsecond
+        either way; without any limit a quick release pulls them into a singularity that no step size resolves: the
+        fewer are left the more strain is theirs, and the faster they go.
+        """
         from xb_muscle_ros.mechanisms import ops
 
-        return exponent if self._smoothing is None else 10 * ops.tanh(exponent / 10)
+        return ops.limited(exponent) if self._smoothing is None else 10 * ops.tanh(exponent / 10)
 
 
 class Mechanism(ABC):
@@ -288,7 +296,8 @@ class Series(Mechanism):
     """What lies between the contractile element and the end of the fibre.
 
     Cross-bridges carry the force in their states: `ce_velocity` and `extension` follow from it. Where the contractile
-    element has no such state, the series element's own length is one (`length_states`), and `balance` applies.
+    element has no such state, the series element's own length is one (`length_states`), and `balance` applies. A block
+    whose length does not follow from force has it among its `states`, and says `force` and `derivatives`.
     """
 
     family = Family.SERIES
@@ -304,6 +313,14 @@ class Series(Mechanism):
     @abstractmethod
     def extension(self, q: Quantities) -> Expr:
         """Length of the series element at the force ``q.force_xb``, power strokes."""
+
+    def force(self, q: Quantities) -> Expr:
+        """What it bears, cross-bridge force; that of the heads, ``q.force_xb``, where it has no states."""
+        return q.force_xb
+
+    def derivatives(self, q: Quantities) -> Mapping[str, Expr]:
+        """Rates of change of its states; ``q.ce_velocity`` (power strokes/s) is among the names."""
+        return {}
 
     @abstractmethod
     def balance(self, q: Quantities, element: Contractile) -> Balance:

@@ -49,9 +49,9 @@ def tanh(z: Expr) -> Expr:
     """Hyperbolic tangent."""
     if _numeric(z):
         return math.tanh(z)
-    import sympy
+    from xb_muscle_ros.models.symbols import HyperbolicTangent
 
-    return sympy.tanh(z)
+    return HyperbolicTangent(z)
 
 
 def erf(z: Expr) -> Expr:
@@ -81,6 +81,17 @@ def tangent_sinh(z: Expr) -> Expr:
     from xb_muscle_ros.models.symbols import TangentSinh
 
     return TangentSinh(z)
+
+
+def limited(z: Expr) -> Expr:
+    """Z up to 12, levelling off at 15 beyond."""
+    if _numeric(z):
+        from xb_muscle_ros.models.intrinsics import limited as compute
+
+        return float(compute(z))
+    from xb_muscle_ros.models.symbols import Limited
+
+    return Limited(z)
 
 
 def deviation(variance: Expr) -> Expr:
@@ -114,6 +125,15 @@ def positive(z: Expr) -> Expr:
     from xb_muscle_ros.models.symbols import Positive
 
     return Positive(z)
+
+
+def above(z: Expr) -> Expr:
+    """1 where z > 0, else 0."""
+    if _numeric(z):
+        return 1.0 if z > 0.0 else 0.0
+    from xb_muscle_ros.models.symbols import UnitStep
+
+    return UnitStep(z)
 
 
 def smooth_series_extension(force: Expr, kse0: Expr, sharpness: Expr) -> Expr:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from xb_muscle_ros.distribution.base import Moments, Representation, Ways
 from xb_muscle_ros.distribution.gaussian import Gaussian
+from xb_muscle_ros.mechanisms import ops
 from xb_muscle_ros.mechanisms.base import Quantities
 from xb_muscle_ros.mechanisms.extra import Chain, Extra, HeadMoments, Unit
 from xb_muscle_ros.mechanisms.ops import Expr
@@ -110,6 +111,7 @@ def rates(model: Composition, q: Quantities) -> Parts:
     if chain is not None:
         others.update(chain.derivatives(velocity))
         others.update(_carried(model, other, chain.other_velocity(velocity), values))
+    others.update(model.series.derivatives(q.for_block(model.series.name)))
     for extra in model.extras:
         others.update(extra.derivatives(q.for_block(extra.name)))
     return Parts(own.kinetics, others, own.ways, own_velocity, q)
@@ -184,6 +186,9 @@ def _heads(model: Composition, representation: Representation, q: Quantities) ->
     others.update(thick.derivatives(q.for_block(thick.name, attachment_rate_net=net)))
     # Strain grows by one power stroke with every power stroke of movement: Q1 by Q0, Q2 by 2 Q1.
     stiffness = _borne(model, q, HeadMoments(0, q.q0, 2 * q.q1))
+    if stiffness != q.q0:
+        # Heads whose force bends lose their stiffness where they are compressed far: it does not go below zero.
+        stiffness = ops.positive(stiffness)
     unit = Unit(q.force_xb, _borne(model, q, HeadMoments(*kinetics)), stiffness)
     return _Heads(q, kinetics, ways, others, unit)
 
@@ -204,7 +209,7 @@ def output_expressions(model: Composition, q: Quantities) -> list[Expr]:
     extension = model.series.extension(q.for_block(model.series.name))
     force_pe = model.parallel.force(q.for_block(model.parallel.name))
     force_pe = force_pe + sum(extra.force(q.for_block(extra.name)) for extra in model.extras)
-    force_ce = q.Fscale * q.force_xb
+    force_ce = q.Fscale * model.series.force(q.for_block(model.series.name))
     return [
         force_ce + force_pe,
         force_ce,

@@ -10,6 +10,7 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.inputs import check_many
 from xb_muscle_ros.models.muscle import GUARD, SCRATCH_ROWS, Array, Muscle, Outputs
 
 
@@ -47,6 +48,7 @@ class MuscleBatch:
         for muscle, row in zip(self.muscles, self._p, strict=True):
             # One copy of a grid's tables is enough.
             muscle.parameters = row
+        self._names = tuple(muscle.fibre.name for muscle in self.muscles)
         size = (len(self.muscles), len(self.state_names))
         self._work = np.zeros((numba.config.NUMBA_NUM_THREADS, SCRATCH_ROWS, size[1]))
         self._report = np.zeros((size[0], 3))
@@ -69,6 +71,7 @@ class MuscleBatch:
         other._p[index] = muscle.parameters
         other._p.setflags(write=False)
         muscle.parameters = other._p[index]
+        other._names = (*self._names[:index], fibre.name, *self._names[index + 1 :])
         other.muscles = (*self.muscles[:index], muscle, *self.muscles[index + 1 :])
         return other
 
@@ -94,11 +97,13 @@ class MuscleBatch:
             dt_s: duration, s.
 
         Raises:
+            UserError: of the first fibre whose length or calcium is out of range, or the duration is.
             StateViolation: of the first fibre that has one; no other fibre's state is lost, since none was changed.
         """
-        out = np.empty_like(states)
         length = np.ascontiguousarray(length_change_l0, dtype=np.float64)
         calcium = np.ascontiguousarray(calcium_um, dtype=np.float64)
+        check_many(self._names, states, self._work.shape[2], length, calcium, dt_s)
+        out = np.empty_like(states)
         self._code.advance_many(states, length, calcium, dt_s, self._p, GUARD, out, self._work, self._report)
         if self._report[:, 0].any():
             k = int(np.flatnonzero(self._report[:, 0])[0])

@@ -25,6 +25,8 @@ from xb_muscle_ros.models.intrinsics import (
     decay,
     deviation,
     hyperbolic_tangent,
+    limited,
+    limited_slope,
     logistic,
     positive_part,
     smooth_series_extension,
@@ -68,9 +70,17 @@ def header(model: Model, smooth: bool, order: int, interpolated: bool) -> str:
 def flat_module(model: Model, smooth: bool) -> str:
     """A model whose every state is a symbol: one flat right-hand side, one flat Rosenbrock step."""
     e = model.equations(smooth)
+    shared = program(_rates(e), "t")
     prepare = function("prepare(p)", "Parameters and what is computed from them once.", ["return p.copy()"])
     stay = function("regrid(s, p, work)", "Moments need no grid.", ["pass"])
-    parts = [header(model, smooth, ros3.ORDER, interpolated=True), prepare, stay, _rhs(e), _attempt(e), _slope(e)]
+    parts = [
+        header(model, smooth, ros3.ORDER, interpolated=True),
+        prepare,
+        stay,
+        _rhs(e, shared),
+        _attempt(e, shared),
+        _slope(e),
+    ]
     parts += [vector("rest", e.parameters, e.rest), _outputs(e), _violation(e, smooth)]
     return "\n\n".join(parts) + "\n\n\n" + kernels() + "\n"
 
@@ -135,9 +145,8 @@ def used_symbols(*programs: Program) -> set[Any]:
     return found
 
 
-def _rhs(e: Equations) -> str:
+def _rhs(e: Equations, body: Program) -> str:
     """Rates of change in the fixed frame, scalars in and a tuple out: nothing touches memory."""
-    body = program(_rates(e), "t")
     names = ", ".join([*(s.name for s in e.states), *_moving(e)])
     lines = [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
     lines.append(f"return ({', '.join(python(r) for r in body.results)},)")
@@ -149,13 +158,13 @@ def _rhs(e: Equations) -> str:
     return text + "\n\n" + function("rhs(z, velocity, calcium, p, out)", doc, call)
 
 
-def _attempt(e: Equations) -> str:
+def _attempt(e: Equations, body: Program) -> str:
     """One Rosenbrock step, written out."""
     names = [*(s.name for s in e.states), *_moving(e)]
     variables = [*(e.symbols[s.name] for s in e.states), e.shift, e.symbols["length_change"]][: len(names)]
     starts = ["0.0" if name == "shift" else name for name in names]
     n = len(names)
-    both, rows = jacobian(program(_rates(e), "t"), variables, "d")
+    both, rows = jacobian(body, variables, "d")
     # The frame is fixed at the start of the step, so the Jacobian is wanted where the shift is zero.
     flat = Program(both.lines, [*both.results, *(x for row in rows for x in row)])
     flat = flat.substituted({e.shift: sympy.Integer(0)}).needed()

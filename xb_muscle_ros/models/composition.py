@@ -12,6 +12,7 @@ from xb_muscle_ros.distribution.gaussian import Gaussian
 from xb_muscle_ros.mechanisms.base import (
     Attachment,
     Detachment,
+    Family,
     Mechanism,
     Parallel,
     Parameter,
@@ -172,7 +173,8 @@ def other_states(model: Composition) -> list[tuple[State, str]]:
     """States of the half-sarcomere in series with the model's own, each with the name it has in that one."""
     if model.in_series is None:
         return []
-    rows = [*Gaussian.states, *(s for block in model.families for s in block.states)]
+    within = (block for block in model.families if block.family not in (Family.SERIES, Family.PARALLEL))
+    rows = [*Gaussian.states, *(s for block in within for s in block.states)]
     found = []
     for row in rows:
         lower = _LEAST_Q2 if row.name == "q2" else row.lower

@@ -12,7 +12,7 @@ from typing import Any
 
 import sympy
 
-from xb_muscle_ros.mechanisms.base import ExponentialRate
+from xb_muscle_ros.mechanisms.base import ExponentialRate, StepRate
 from xb_muscle_ros.models.codegen import assignments, function, header, kernels, parameter_loads, used_symbols, vector
 from xb_muscle_ros.models.composition import INPUTS, Composition
 from xb_muscle_ros.models.grid_equations import SUMS, GridEquations, grid_equations
@@ -35,6 +35,7 @@ def grid_module(model: Composition, smooth: bool, remap: str) -> str:
         f"N_OTHERS, N_PARAMETERS, N_RATES = {len(e.states)}, {len(e.parameters)}, {len(e.leaving)}\n"
         f"TEARS = {any(torn for _, torn in e.leaving)!r}\n"
         f"TORN = {_torn_state(e)!r}\n"
+        f"IS_STEP = {tuple(isinstance(rate, StepRate) for rate, _ in e.leaving)!r}\n"
         f"BINS, RANGE, REGRID = {index['bins']}, {index['strain_range']}, {index.get('regrid', -1)}\n"
     )
     head = header(model, smooth, ros2.ORDER, interpolated=False)

@@ -70,6 +70,24 @@ def tangent_cosh(z: float) -> float:
 
 
 @njit(cache=True)
+def limited(z: float) -> float:
+    """Z up to 12, levelling off at 15 beyond."""
+    if z < 12.0:
+        return z
+    t: float = hyperbolic_tangent((z - 12.0) / 3.0)
+    return 12.0 + 3.0 * t
+
+
+@njit(cache=True)
+def limited_slope(z: float) -> float:
+    """Derivative of `limited`."""
+    if z < 12.0:
+        return 1.0
+    t: float = hyperbolic_tangent((z - 12.0) / 3.0)
+    return 1.0 - t * t
+
+
+@njit(cache=True)
 def deviation(v: float) -> float:
     """sqrt((v + sqrt(v² + 4e-12))/2), without cancellation for negative v."""
     root = math.sqrt(v * v + 4e-12)
@@ -133,4 +151,11 @@ static inline double deviation(double v) {
     return v < 0.0 ? sqrt(2e-12 / (root - v)) : sqrt(0.5 * (v + root));
 }
 static inline double hyperbolic_tangent(double z) { return 1.0 - 2.0 / (exp(2.0 * z) + 1.0); }
+static inline double limited(double z) {
+    return z < 12.0 ? z : 12.0 + 3.0 * hyperbolic_tangent((z - 12.0) / 3.0);
+}
+static inline double limited_slope(double z) {
+    double t = hyperbolic_tangent((z - 12.0) / 3.0);
+    return z < 12.0 ? 1.0 : 1.0 - t * t;
+}
 """

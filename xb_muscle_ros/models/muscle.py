@@ -13,6 +13,7 @@ import numpy.typing as npt
 from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.compiled import compiled
 from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.inputs import check, check_samples
 from xb_muscle_ros.models.registry import compose, model_of_set
 
 Array = npt.NDArray[np.float64]
@@ -98,7 +99,12 @@ class Muscle:
         return np.zeros((SCRATCH_ROWS, self._n))
 
     def rest(self, length_change_l0: float = 0.0) -> Array:
-        """State of a fibre at rest without calcium, at a length change in L0."""
+        """State of a fibre at rest without calcium, at a length change in L0.
+
+        Raises:
+            UserError: no fibre has this length.
+        """
+        check(self.fibre.name, length_change_l0, 0.0)
         state = np.zeros(self._n)
         self.code.rest(self.parameters, state)
         state[-3] = length_change_l0
@@ -114,9 +120,10 @@ class Muscle:
                 takes minutes of muscle time at low calcium and milliseconds of computing (seconds on a large grid).
 
         Raises:
-            UserError: the fibre does not come to rest at this calcium.
+            UserError: length, calcium or duration out of range, or the fibre does not come to rest at this calcium.
             StateViolation: a state left its bounds.
         """
+        check(self.fibre.name, length_change_l0, calcium_um, 1.0 if duration_s is None else duration_s)
         state = self.rest(length_change_l0)
         if duration_s is not None:
             return self.hold(state, calcium_um, duration_s)
@@ -143,8 +150,10 @@ class Muscle:
         the step is halved as often as needed, so that the result holds for any input. Nothing is clipped.
 
         Raises:
+            UserError: length, calcium or duration out of range.
             StateViolation: no step size leads to an allowed state; names fibre, state and time within the step.
         """
+        check(self.fibre.name, length_change_l0, calcium_um, dt_s)
         return self._advance(state, length_change_l0, calcium_um, dt_s, dt_s, GUARD)
 
     def outputs(self, state: Array) -> Outputs:
@@ -178,6 +187,7 @@ class Muscle:
             every: stride of the samples whose states are returned, the first included.
 
         Raises:
+            UserError: see `inputs.check_samples`.
             StateViolation: see `step`; the time counts from the first sample.
         """
         return self.run_counted(state, dt_s, length_change_l0, calcium_um, substeps, every)[0]
@@ -194,6 +204,7 @@ class Muscle:
         """As `run`, with the number of steps tried."""
         states = np.zeros(((length_change_l0.size - 1) // every + 1, self._n))
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (dt_s, length_change_l0, calcium_um)]
+        check_samples(self.fibre.name, *arrays)
         code, fault, k, within, steps = self.code.run(
             state, *arrays, self.parameters, GUARD, substeps, every, states, self._work
         )
@@ -220,6 +231,7 @@ class Muscle:
             tolerance: error of one step in units of the states (1e-6: about 1e-7 F0).
 
         Raises:
+            UserError: see `inputs.check_samples`.
             StateViolation: see `step`.
         """
         return self.follow_counted(state, corner_s, length_change_l0, calcium_um, sample_s, tolerance)[0]
@@ -236,6 +248,7 @@ class Muscle:
         """As `follow`, with the number of steps tried."""
         states = np.zeros((sample_s.size, self._n))
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (corner_s, length_change_l0, calcium_um, sample_s)]
+        check_samples(self.fibre.name, np.diff(arrays[0]), arrays[1], arrays[2])
         code, fault, t, steps, _ = self.code.follow(
             state, *arrays, self.parameters, 1e-4, tolerance, states, self._work
         )

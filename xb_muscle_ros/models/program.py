@@ -134,8 +134,6 @@ class _OwnCalls:
             return f"{CALLS[name]}({', '.join(self._print(a) for a in expr.args)})"  # type: ignore[attr-defined]
         return str(super()._print_Function(expr))  # type: ignore[misc]
 
-    _print_tanh = _print_Function
-
     def _print_Pow(self, expr: Any, **how: Any) -> str:
         return _power(self, expr) or str(super()._print_Pow(expr, **how))  # type: ignore[misc]
 

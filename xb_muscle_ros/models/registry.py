@@ -40,6 +40,7 @@ from xb_muscle_ros.mechanisms.parallel.linear import LinearParallel
 from xb_muscle_ros.mechanisms.parallel.softplus import SoftplusParallel
 from xb_muscle_ros.mechanisms.series.exponential import ExponentialSeries
 from xb_muscle_ros.mechanisms.series.rigid import RigidSeries
+from xb_muscle_ros.mechanisms.series.slack import SlackSeries
 from xb_muscle_ros.mechanisms.thick_filament.always_on import AlwaysOnThickFilament
 from xb_muscle_ros.mechanisms.thick_filament.force_dependent import ForceDependentThickFilament
 from xb_muscle_ros.mechanisms.thin_filament.cooperative import CooperativeThinFilament
@@ -124,6 +125,7 @@ _BASES: Mapping[str, Row | HillRow] = {
 # Every base also comes with these blocks in place of its own, named by suffixes in this order.
 _MODIFIERS: Mapping[str, Mapping[str, type]] = {
     "rigid": {"series": RigidSeries},
+    "slack": {"series": SlackSeries},
     "softplus": {"parallel": SoftplusParallel},
 }
 # What the field calls a base with its first suffix.
@@ -134,6 +136,9 @@ def _variants() -> Iterator[tuple[str, str, Row | HillRow]]:
     """Name, base and blocks of every model, bases first."""
     for chosen in sorted(product((False, True), repeat=len(_MODIFIERS))):
         suffixes = [suffix for suffix, wanted in zip(_MODIFIERS, chosen, strict=True) if wanted]
+        blocks = [slot for suffix in suffixes for slot in _MODIFIERS[suffix]]
+        if len(blocks) > len(set(blocks)):
+            continue
         for base, row in _BASES.items():
             name = "_".join([base, *suffixes])
             for long, short in _KNOWN_AS.items():
@@ -259,6 +264,21 @@ def split_set(name: str, where: str = "") -> tuple[str, str]:
 def model_of_set(name: str, where: str = "") -> str:
     """Model that a parameter set of a fibre file belongs to: see `split_set`."""
     return split_set(name, where)[0]
+
+
+def slack_of(name: str) -> str | None:
+    """Set or model of the same blocks whose series spring goes slack; None where it does already.
+
+    Raises:
+        UserError: see `split_set`.
+    """
+    model, version = split_set(name)
+    stem, *mechanisms = model.split(SEPARATOR)
+    if row_of(model).series is SlackSeries:
+        return None
+    wanted = MODELS[stem]._replace(series=SlackSeries)
+    slack = next(known for known, row in MODELS.items() if row == wanted)
+    return with_mechanisms(slack + version, *mechanisms)
 
 
 def compose(model: str, method: str = "gaussian") -> Model:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
+from xb_muscle_ros.models.registry import slack_of
 from xb_muscle_ros.node.inputs import Counts
 from xb_muscle_ros.node.status import Status
 
@@ -27,6 +28,7 @@ class Report:
         cpu_share: of one core since the last report, whole process.
         overruns_new, timeouts_new: since the last report.
         timeout_s: allowed age of the newest length sample; 0 for any.
+        pushed: fibre and force (F0) of the strongest push since the last report; None where all pulled.
     """
 
     node: str
@@ -45,6 +47,7 @@ class Report:
     overruns_new: int = 0
     timeouts_new: int = 0
     timeout_s: float = 0.0
+    pushed: tuple[str, float] | None = None
 
 
 def diagnostics(report: Report) -> DiagnosticArray:
@@ -88,6 +91,11 @@ def _verdict(report: Report) -> tuple[bytes, str]:
         remarks.append(f"odd input {odd} times")
     if report.overruns_new:
         remarks.append(f"{report.overruns_new} overruns")
+    if report.pushed is not None:
+        fibre, force_f0 = report.pushed
+        slack = slack_of(report.model)
+        remedy = f" (model {slack} does not)" if slack else ""
+        remarks.append(f"{fibre} pushes, {force_f0:.3g} F0, where a muscle would be slack{remedy}")
     return (level, "; ".join(remarks)) if remarks else (DiagnosticStatus.OK, "stepping")
 
 

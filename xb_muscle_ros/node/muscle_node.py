@@ -159,18 +159,21 @@ class MuscleNode(LifecycleNode):
         names = [fibre.name for fibre in fibres]
         stepping: Lockstep | Realtime | _Many
         inlet: Inlet | InletOfMany
+        outlet: OutputMessages | OutputMessagesMany
         if self._gate.many:
-            many = stepping = self._many(fibres, OutputMessagesMany(names, force, moments))
+            all_messages = outlet = OutputMessagesMany(names, force, moments)
+            many = stepping = self._many(fibres, all_messages)
             inlet = InletOfMany(names, many, self.get_logger())
         else:
-            one = stepping = self._one(fibres[0], OutputMessages(names[0], force, moments))
+            messages = outlet = OutputMessages(names[0], force, moments)
+            one = stepping = self._one(fibres[0], messages)
             inlet = Inlet(names[0], one, self.get_logger())
         self._stepping, self._inlet = stepping, inlet
         # Calcium first: where both wait, it is then taken before the length that needs it.
         for topic, take in (("muscle/calcium", inlet.take_calcium), ("muscle/length", inlet.take_length)):
             made = self.create_subscription(JointState, topic, take, _INPUT_QOS[self._mode], **_overridable())
             self._entities.append((made, self.destroy_subscription))
-        self._reporter.watch(fibres, stepping, inlet)
+        self._reporter.watch(fibres, stepping, inlet, outlet)
 
     def _one(self, fibre: Fibre, messages: OutputMessages) -> Lockstep | Realtime:
         muscle = Muscle(fibre)

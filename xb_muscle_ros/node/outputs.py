@@ -32,13 +32,21 @@ def room(message: JointState, field: str, size: int) -> MutableSequence[float]:
     return values
 
 
+# Force below it, F0, is a push; rounding of a slack fibre stays above.
+_PUSHES_F0 = -1e-3
+
+
 class OutputMessages:
     """Publishes one fibre's force (``muscle/force``) and moments (``muscle/moments``).
 
     Force: effort, N; position and velocity of the contractile element, m and m/s. Moments: dimensionless, in position.
+
+    Attributes:
+        pushed: fibre and force (F0) of the strongest push since it was last cleared; None where all pulled.
     """
 
     def __init__(self, fibre: str, force: Publisher, moments: Publisher) -> None:
+        self.pushed: tuple[str, float] | None = None
         self._to_force = force
         self._to_moments = moments
         self._force = JointState()
@@ -58,6 +66,8 @@ class OutputMessages:
         for message in (self._force, self._moments):
             stamp = message.header.stamp
             stamp.sec, stamp.nanosec = sec, nanosec
+        if outputs.force_f0 < _PUSHES_F0 and (self.pushed is None or outputs.force_f0 < self.pushed[1]):
+            self.pushed = self._force.name[0], outputs.force_f0
         reference = scale.reference_length_m
         self._effort[0] = outputs.force_f0 * scale.f0_n
         self._position[0] = reference * (1.0 + outputs.ce_length_change_l0)
@@ -78,9 +88,14 @@ _MOMENTS = slice(Outputs._fields.index(MOMENTS[0]), Outputs._fields.index(MOMENT
 
 
 class OutputMessagesMany:
-    """Publishes forces and moments of many fibres, all in one message each; see `OutputMessages`."""
+    """Publishes forces and moments of many fibres, all in one message each; see `OutputMessages`.
+
+    Attributes:
+        pushed: see `OutputMessages`.
+    """
 
     def __init__(self, fibres: Sequence[str], force: Publisher, moments: Publisher) -> None:
+        self.pushed: tuple[str, float] | None = None
         self._names = list(fibres)
         self._to_force = force
         self._to_moments = moments
@@ -97,6 +112,9 @@ class OutputMessagesMany:
         """
         pair = self._all if which is None else _Pair([self._names[i] for i in which.tolist()])
         pair.fill(stamp_ns, outputs, scales)
+        least = outputs[:, _FORCE].min()
+        if least < _PUSHES_F0 and (self.pushed is None or least < self.pushed[1]):
+            self.pushed = pair.force.name[int(outputs[:, _FORCE].argmin())], float(least)
         self._to_force.publish(pair.force)
         if self._to_moments.get_subscription_count():
             pair.fill_moments(stamp_ns, outputs)

@@ -34,6 +34,12 @@ class Inlet(Protocol):
     last_length_s: float | None
 
 
+class Outlet(Protocol):
+    """What is reported of the output."""
+
+    pushed: tuple[str, float] | None
+
+
 class Reporter:
     """Publishes ``/diagnostics``; rates are those since the last report."""
 
@@ -44,18 +50,19 @@ class Reporter:
         self._report = Report(node.get_fully_qualified_name(), mode, "unconfigured")
         self._stepping: Stepping | None = None
         self._inlet: Inlet | None = None
+        self._outlet: Outlet | None = None
         self._last = (time.monotonic(), time.process_time(), 0, 0, 0)
 
-    def watch(self, fibres: Sequence[Fibre], stepping: Stepping, inlet: Inlet) -> None:
+    def watch(self, fibres: Sequence[Fibre], stepping: Stepping, inlet: Inlet, outlet: Outlet) -> None:
         """Report on these from now on."""
         self._report.fibre = enumerated([fibre.name for fibre in fibres])
         self._report.fibres, self._report.model = len(fibres), fibres[0].model
-        self._stepping, self._inlet = stepping, inlet
+        self._stepping, self._inlet, self._outlet = stepping, inlet, outlet
         self._report.refused, self._report.odd = inlet.refused, stepping.counts
 
     def forget(self) -> None:
         """There is nothing to report on but the node itself."""
-        self._stepping = self._inlet = None
+        self._stepping = self._inlet = self._outlet = None
         self._report = Report(self._report.node, self._mode, "unconfigured")
 
     def report(self, state: str, now_s: float, timeout_s: float) -> None:
@@ -79,6 +86,8 @@ class Reporter:
             report.ignored_names = self._inlet.ignored_names
             last = self._inlet.last_length_s
             report.input_age_s = None if last is None else now_s - last
+        if self._outlet is not None:
+            report.pushed, self._outlet.pushed = self._outlet.pushed, None
         message = diagnostics(report)
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)

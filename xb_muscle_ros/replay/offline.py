@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.errors import UserError, naming
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.models.registry import slack_of
 from xb_muscle_ros.trials.ros_types import to_ns
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
 from xb_muscle_ros.trials.trial import Array, Trial
@@ -43,15 +44,16 @@ def simulate_trial(muscle: Muscle, trial: Trial, substeps: int = 1, settle_s: fl
         settle_s: time to settle, s; None until at rest.
 
     Raises:
-        UserError: no calcium at the start.
-        StateViolation: see `Muscle.step`.
+        UserError: no calcium at the start, or length or calcium out of range; names the trial.
+        StateViolation: see `Muscle.step`; names the trial.
     """
     length = trial.length_change_l0
     calcium = calcium_per_step(trial)
-    state = muscle.settle(float(length[0]), float(calcium[0]), settle_s)
     # Whole nanoseconds, as message stamps have them: the node computes the same differences.
     dt_s = np.diff(to_ns(trial.time_s)) / 1e9
-    states = muscle.run(state, dt_s, length, calcium, substeps)
+    with naming(f"trial {trial.facts.trial}"):
+        state = muscle.settle(float(length[0]), float(calcium[0]), settle_s)
+        states = muscle.run(state, dt_s, length, calcium, substeps)
     return as_simulated(muscle, trial, trial.time_s, states)
 
 
@@ -65,6 +67,29 @@ def as_simulated(muscle: Muscle, trial: Trial, time_s: Array, states: Array) -> 
         ce_length_m=reference * (1.0 + out["ce_length_change_l0"]),
         ce_velocity_m_per_s=reference * out["ce_velocity_l0_per_s"],
         moments={name: out[name] for name in MOMENTS},
+    )
+
+
+# Forces below it, F0, are worth a word: a tendon of nothing but rounding stays above.
+_PUSHES_F0 = -1e-3
+
+
+def pushing(trial: Trial, simulated: Simulated, model: str) -> str | None:
+    """One line on a model that pushes, where a muscle would be slack; None where it pulls.
+
+    Args:
+        trial, simulated: the trial and what the model made of it.
+        model: its name, or that of its parameter set.
+    """
+    k = int(np.argmin(simulated.force_n))
+    force_f0 = float(simulated.force_n[k]) / trial.facts.f0_n
+    if force_f0 >= _PUSHES_F0:
+        return None
+    slack = slack_of(model)
+    remedy = f"; in model {slack} the series spring goes slack (docs/model.md)" if slack else ""
+    return (
+        f"trial {trial.facts.trial}: model {model} pushes, force falls to {force_f0:.3g} F0 at "
+        f"t = {simulated.time_s[k]:g} s, where a muscle would be slack{remedy}"
     )
 
 

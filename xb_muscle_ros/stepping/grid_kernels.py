@@ -24,8 +24,11 @@ RANGE = 0
 GAMMA = 0.0
 TEARS = False
 TORN = -1
+IS_STEP = (False,)
 ERROR_SHARE = 0.0
 
+# Of `models.intrinsics`.
+limited: Callable[[float], float]
 # Scalar functions of the model, each returning a tuple; see `models.grid_codegen`.
 table_slopes: Callable[..., Any]
 factors: Callable[..., Any]
@@ -50,8 +53,10 @@ def prepare(p: Array) -> Any:
     slopes = table_slopes(p)
     for k in range(N_RATES):
         for i in range(bins):
-            # Past exp(700) a double ends; a rate of 1e300 1/s empties a bin like any other that size.
-            whole[N_PARAMETERS + k * bins + i] = math.exp(min(slopes[k] * (i * dx - p[RANGE]), 690.0))
+            exponent = slopes[k] * (i * dx - p[RANGE])
+            # A rate levels off as the moments' does. A step's exponential is none: past exp(700) a double ends.
+            exponent = min(exponent, 690.0) if IS_STEP[k] else limited(exponent)
+            whole[N_PARAMETERS + k * bins + i] = math.exp(exponent)
     return whole
 
 

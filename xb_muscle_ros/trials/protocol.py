@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +15,60 @@ from xb_muscle_ros.trials.trial import Array, Phase, Trial, TrialFacts
 SPEED_L0_PER_S = 0.4545
 TEST_STRETCH_L0 = 0.0383
 TEST_DURATION_S = TEST_STRETCH_L0 / SPEED_L0_PER_S
+
+
+class Allowed(NamedTuple):
+    """What a number of a protocol may be.
+
+    Attributes:
+        lower, upper: bounds.
+        unit: of the number.
+        positive: the lower bound itself is not allowed.
+        hint: what is likely meant by a number above.
+    """
+
+    lower: float
+    upper: float
+    unit: str
+    positive: bool = False
+    hint: str = ""
+
+    def check(self, what: str, value: float) -> None:
+        """Check a number.
+
+        Args:
+            what: begins the message: the option or field.
+            value: the number.
+
+        Raises:
+            UserError: out of range or not a number.
+        """
+        # Written so that a NaN fails the comparison.
+        if self.lower <= value <= self.upper and not (self.positive and value == self.lower):
+            return
+        unit = f" {self.unit}" if self.unit else ""
+        least = f"above {self.lower:g}" if self.positive else f"{self.lower:g}"
+        hint = self.hint.format(percent=f"{value / 100:g} is {value:g} %") if value > self.upper else ""
+        raise UserError(f"{what} is {value:g}{unit}; allowed is {least} to {self.upper:g}{unit}{hint}")
+
+
+_IN_L0 = ": amplitudes are in L0, {percent}"
+_IN_S = ": times are in s"
+ALLOWED: Mapping[str, Allowed] = MappingProxyType(
+    {
+        "amplitude_l0": Allowed(0.0, 0.5, "L0", hint=_IN_L0),
+        "test_stretch_l0": Allowed(0.0, 0.5, "L0", hint=_IN_L0),
+        "recovery_s": Allowed(0.0, 3600.0, "s", hint=_IN_S),
+        "lead_s": Allowed(0.0, 3600.0, "s", hint=_IN_S),
+        "hold_s": Allowed(0.0, 3600.0, "s", hint=_IN_S),
+        "speed_l0_per_s": Allowed(0.0, 1000.0, "L0/s", positive=True),
+        "settle_s": Allowed(0.0, 1e6, "s", positive=True, hint=_IN_S),
+        "pca": Allowed(3.0, 12.0, "", hint=": pCa is -log10 of free calcium in M"),
+        "rate_hz": Allowed(1.0, 1e6, "1/s"),
+    }
+)
+"""What the numbers of a protocol may be, by name."""
+_MOST_SAMPLES = 20_000_000
 
 
 @dataclass(frozen=True)
@@ -27,7 +84,7 @@ class StretchShortenStretch:
         test_stretch_l0: amplitude of the test stretch, L0.
 
     Raises:
-        UserError: a duration or amplitude is negative, or the speed is not positive.
+        UserError: a number is out of range; see `ALLOWED`.
     """
 
     amplitude_l0: float
@@ -39,11 +96,7 @@ class StretchShortenStretch:
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            least_open = name == "speed_l0_per_s"
-            if not np.isfinite(value) or value < 0.0 or (least_open and value == 0.0):
-                raise UserError(
-                    f"protocol: {name} is {value:g}; allowed is any number {'above' if least_open else 'from'} 0"
-                )
+            ALLOWED[name].check(f"protocol: {name}", value)
 
     @property
     def phases(self) -> tuple[Phase, ...]:
@@ -78,14 +131,25 @@ class StretchShortenStretch:
         return np.array(times), np.array(lengths)
 
     def trial(self, fibre: str, pca: float, rate_hz: float = 1000.0, name: str = "") -> Trial:
-        """The protocol as a trial without measured force, in normalised units (1 m is one L0)."""
+        """The protocol as a trial without measured force, in normalised units (1 m is one L0).
+
+        Raises:
+            UserError: pCa or rate is out of range, or there would be too many samples.
+        """
+        ALLOWED["pca"].check("protocol: pca", pca)
+        ALLOWED["rate_hz"].check("protocol: rate_hz", rate_hz)
         corner_s, corner_l0 = self.corners()
         count = int(np.floor(corner_s[-1] * rate_hz * (1.0 + 1e-12))) + 1
+        if count > _MOST_SAMPLES:
+            raise UserError(
+                f"protocol: {corner_s[-1]:g} s at {rate_hz:g} samples per second are {count} samples; allowed are "
+                f"{_MOST_SAMPLES}: take a lower rate"
+            )
         # On whole nanoseconds, as a bag will hold them: a trial and its bag give the same simulation.
         time_s = np.round(np.arange(count) / rate_hz * 1e9) / 1e9
         facts = TrialFacts(
             fibre=fibre,
-            trial=name or f"amp{self.amplitude_l0 * 1e4:.0f}_rt{self.recovery_s * 1e3:g}ms_pca{pca * 10:.0f}",
+            trial=name or f"amp{self.amplitude_l0 * 1e4:g}_rt{self.recovery_s * 1e3:g}ms_pca{pca * 10:g}",
             pca=pca,
             amplitude_l0=self.amplitude_l0,
             recovery_s=self.recovery_s,

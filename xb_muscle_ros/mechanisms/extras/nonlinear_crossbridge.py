@@ -13,7 +13,11 @@ CURVATURE = Parameter(
 
 
 class NonlinearCrossbridge(Extra):
-    """A head at strain x bears (1 + x) + epsilon (1 + x)²; all heads Q0 + Q1 + epsilon (Q0 + 2 Q1 + Q2)."""
+    """A head at strain x bears (1 + x) + epsilon (1 + x)²; all heads Q0 + Q1 + epsilon (Q0 + 2 Q1 + Q2).
+
+    Where quick shortening takes heads past the turning point of that parabola, x = -1 - 1/(2 epsilon), they have no
+    stiffness left; the velocity of the contractile element counts it as 0 there, not as less.
+    """
 
     name = "nonlinear_crossbridge"
     needs = Needs.HEADS

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from xb_muscle_ros.mechanisms import ops
 from xb_muscle_ros.mechanisms.base import Balance, Contractile, Parameter, Quantities, Series, State
 from xb_muscle_ros.mechanisms.ops import Expr
@@ -33,7 +35,7 @@ class ExponentialSeries(Series):
     """
 
     name = "exponential"
-    parameters = (KSE, KSE0, SMOOTH_STIFFNESS)
+    parameters: ClassVar[tuple[Parameter, ...]] = (KSE, KSE0, SMOOTH_STIFFNESS)
     length_states = (EXTENSION,)
 
     def ce_velocity(self, q: Quantities) -> Expr:

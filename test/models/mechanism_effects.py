@@ -1,0 +1,21 @@
+"""A value for each mechanism beside the families at which it is felt; the first one switches it on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+EFFECT: Mapping[str, Mapping[str, float]] = {
+    "viscous_drag": {"drag": 0.01},
+    "passive_viscoelasticity": {"pv_stiffness": 1.0, "pv_tau": 0.05, "pv_ratio": 0.5},
+    "weakly_bound_heads": {"weak_stiffness": 40.0, "weak_detachment": 500.0},
+    "active_titin": {"titin_stiffness": 2.0, "titin_calcium": 0.5},
+    "static_calcium_stiffness": {"calcium_stiffness": 2.0, "stiffness_calcium": 0.5},
+    "length_dependent_activation": {"calcium_per_length": 2.0},
+    "lattice_spacing": {"attachment_per_length": 2.0},
+    "filament_overlap": {"overlap_per_length": -2.0},
+    "strain_recruited_heads": {"strain_recruitment": 150.0},
+    "nonlinear_crossbridge": {"head_curvature": 0.1},
+    "half_sarcomere_spread": {"hs_spread": 0.1},
+    "temperature": {"warmer": 5.0},
+    "phosphate": {"phosphate_detachment": 5.0},
+}

@@ -1,0 +1,53 @@
+"""What replay says of a trial whose simulation fails, or whose model pushes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from xb_muscle_ros.errors import StateViolation, UserError, naming
+from xb_muscle_ros.models.fibre_file import load_fibre
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.replay.offline import pushing, simulate_trial
+from xb_muscle_ros.trials.trial import Trial, TrialFacts
+
+
+@pytest.fixture(scope="module")
+def muscle() -> Muscle:
+    return Muscle(load_fibre("18Dec2017a"))
+
+
+def shortening() -> Trial:
+    """From 1.3 to 0.7 L0 at 20 L0/s, full calcium."""
+    time_s = np.arange(400) * 1e-3
+    length = np.interp(time_s, [0.0, 0.3, 0.33], [1.3, 1.3, 0.7])
+    return Trial(TrialFacts("18Dec2017a", "vmax"), time_s, length, np.zeros(1), np.array([10.0**1.5]))
+
+
+def test_a_model_that_pushes_is_told_once_with_trial_force_and_time(muscle: Muscle) -> None:
+    trial = shortening()
+    simulated = simulate_trial(muscle, trial)
+    told = pushing(trial, simulated, "3state_coop")
+    assert told is not None
+    assert told.startswith("trial vmax: model 3state_coop pushes, force falls to -0.")
+    assert f"at t = {trial.time_s[int(np.argmin(simulated.force_n))]:g} s" in told
+    assert "in model 3state_coop_slack the series spring goes slack" in told
+    slack = Muscle(load_fibre("18Dec2017a", "3state_coop_slack"))
+    there = simulate_trial(slack, trial)
+    assert there.force_n.min() >= 0.0
+    assert pushing(trial, there, "3state_coop_slack") is None
+
+
+def test_a_failing_simulation_names_its_trial(muscle: Muscle) -> None:
+    trial = shortening()
+    absurd = replace(trial, length_m=np.where(trial.time_s > 0.2, -0.2, trial.length_m))
+    with pytest.raises(UserError, match=r"^trial vmax: fibre 18Dec2017a, sample 201: length change is -1\.2 L0"):
+        simulate_trial(muscle, absurd)
+
+
+def test_naming_keeps_the_kind_of_error_and_its_facts() -> None:
+    with pytest.raises(StateViolation, match=r"^trial x: fibre f: state q0 became 2") as caught, naming("trial x"):
+        raise StateViolation("f", "q0", 0.1, 2.0, "0 to 1", "check")
+    assert (caught.value.state, caught.value.time_s) == ("q0", 0.1)
