@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_work, warn, work_options_of
+from xb_muscle_ros.cli.common import add_reading, add_work, known_of, warn, work_options_of
 from xb_muscle_ros.errors import UserError
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ def add(subparsers: Subparsers) -> None:
     )
     parser.add_argument("--model", help="parameter set of the fibre file (default: the one the file names)")
     parser.add_argument("--method", help="how heads are distributed over strain (default: the fibre file's)")
+    add_reading(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for report and results")
     parser.add_argument("--quick", action="store_true", help="look less hard: minutes become tens of seconds")
     parser.add_argument("--seed", type=int, default=1, help="of the bootstrap (default 1)")
@@ -50,6 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.model,
         arguments.method,
         work_options_of(arguments, journal=out / "journal.jsonl"),
+        known=known_of(arguments),
+        only=arguments.trials_of,
     )
     for line in found["warnings"]:
         warn(line)

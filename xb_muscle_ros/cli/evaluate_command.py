@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_work, warn, work_options_of
+from xb_muscle_ros.cli.common import add_reading, add_work, known_of, warn, work_options_of
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
@@ -25,6 +25,7 @@ def add(subparsers: Subparsers) -> None:
         "--fiber", "--fibre", dest="fiber", nargs="+", default=[], metavar="FIBER",
         help="fibre files or names (default: the package's file of a bag's fibre; with --paper all that were measured)",
     )  # fmt: skip
+    add_reading(parser, several=True)
     parser.add_argument("--model", nargs="+", help="parameter sets (default: all that the fibre files have)")
     parser.add_argument("--method", help="how heads are distributed over strain (default: the fibre file's)")
     parser.add_argument("--settle", type=float, help="isometric time before each trial, s (default: until at rest)")
@@ -73,6 +74,8 @@ def run(arguments: argparse.Namespace) -> int:
         golden=arguments.golden,
         out=arguments.out,
         work=work_options_of(arguments),
+        known=known_of(arguments),
+        only=arguments.trials_of,
     )
     results = evaluate(request, warn)
     for line in results.warnings:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xb_muscle_ros.cli.common import add_fibre, add_work, fibre_of, warn, work_options_of
+from xb_muscle_ros.cli.common import add_fibre, add_reading, add_work, fibre_of, study_of, warn, work_options_of
 from xb_muscle_ros.errors import UserError
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ def add(subparsers: Subparsers) -> None:
     )
     parser.add_argument("bags", nargs="*", metavar="BAG", help="bags or folders of bags, in the order of recording")
     add_fibre(parser)
+    add_reading(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="fibre file to write")
     parser.add_argument("--hold-out", nargs="+", default=[], metavar="RULE", help="keep these trials out of the fit")
     parser.add_argument("--train", nargs="+", default=[], metavar="RULE", help="fit to these trials only")
@@ -123,16 +124,11 @@ def _figures(folder: Path, fitted: Any, found: dict[str, Any]) -> list[Path]:
 
 
 def _trials(arguments: argparse.Namespace) -> list[Trial]:
-    from xb_muscle_ros.trials.bags import find_bags, read_trial
-
     if not arguments.bags and arguments.features is None:
         raise UserError("nothing to fit to; give bags of trials, or --features")
     if not arguments.bags and arguments.features_of is None:
         raise UserError("without bags nobody knows whose features to fit; give --features-of")
-    trials = [read_trial(path) for path in find_bags(arguments.bags)] if arguments.bags else []
-    for trial in trials:
-        for warning in trial.warnings:
-            warn(warning)
+    trials = study_of(arguments, fibre_of(arguments)).trials if arguments.bags else []
     fibres = dict.fromkeys(trial.facts.fibre for trial in trials)
     if len(fibres) > 1:
         raise UserError(f"trials are of fibres {', '.join(fibres)}; fit one fibre at a time")
