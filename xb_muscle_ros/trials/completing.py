@@ -11,10 +11,13 @@ import numpy as np
 
 from xb_muscle_ros.trials.bag_reading import Reading
 from xb_muscle_ros.trials.phases import conditioning, detect_phases, initial_isometric
-from xb_muscle_ros.trials.trial import Trial
+from xb_muscle_ros.trials.trial import Array, Trial
 
 # Digits of a pCa that is taken from calcium: 10^(6 - pCa) does not come back to the last bit.
 _PCA_DIGITS = 6
+_PHASES = "phases found from length"
+# A record moves where means of so many parts differ by this share of length, and by so many of their standard errors.
+_PARTS, _LEAST_MOVE, _ERRORS = 20, 3e-3, 8.0
 
 
 class FibreConstants(Protocol):
@@ -70,7 +73,8 @@ def complete(reading: Reading, known: Known) -> tuple[Trial, tuple[str, ...]]:
     notes: list[str] = []
     if "phases" in unknown:
         trial = _with_phases(trial, _length_for_phases(trial, unknown, known))
-        notes.append("phases found from length")
+        hidden = [phase.name for phase in trial.facts.phases] == ["isometric"] and _moves(trial.length_m)
+        notes.append("no phases found, though length moves: its noise hides them" if hidden else _PHASES)
     trial, told = _with_scales(trial, unknown, known)
     notes += told
     facts = trial.facts
@@ -94,6 +98,15 @@ def pca_of(trial: Trial) -> float | None:
     if trial.facts.pca is not None or np.ptp(calcium) > 0.0 or calcium[0] <= 0.0:
         return trial.facts.pca
     return round(float(6.0 - np.log10(calcium[0])), _PCA_DIGITS)
+
+
+def _moves(length_m: Array) -> bool:
+    """Whether length changes, slowly or under noise: means of stretches of the record differ beyond their errors."""
+    parts = np.array_split(length_m, min(_PARTS, max(length_m.size // 4, 1)))
+    means = np.array([float(np.mean(part)) for part in parts])
+    errors = np.array([float(np.std(part)) / np.sqrt(part.size) for part in parts])
+    least = max(_LEAST_MOVE * float(np.median(length_m)), _ERRORS * float(np.median(errors)))
+    return bool(np.ptp(means) > least)
 
 
 def counted(notes: Iterable[tuple[str, ...]]) -> list[str]:
