@@ -16,6 +16,7 @@ from xb_muscle_ros.evaluate.checks import check_trial
 from xb_muscle_ros.models.fibre_file import Fibre, base_set, fibre_folders, find_fibre_file, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.scores.conditions import nominal
 from xb_muscle_ros.scores.enhancement import AFTER_S, enhancement
 from xb_muscle_ros.scores.isometric import isometric_force
 from xb_muscle_ros.scores.redevelopment import redevelopment, restretch_end, still_until
@@ -23,7 +24,7 @@ from xb_muscle_ros.scores.rmsd import force_rmsd, windows
 from xb_muscle_ros.scores.stiffness import stiffness_of_phase
 from xb_muscle_ros.trials.bag_files import METADATA
 from xb_muscle_ros.trials.bag_reading import TrialBag
-from xb_muscle_ros.trials.completing import Known, pca_of
+from xb_muscle_ros.trials.completing import CONDITIONING_FOUND, Known, pca_of
 from xb_muscle_ros.trials.study import left_out, trial_of_bag
 from xb_muscle_ros.trials.trial import Array, Trial
 
@@ -113,11 +114,14 @@ def evaluate_bag(task: Mapping[str, Any]) -> Found:
         if len(bag.fibres) > 1 and "fibre" not in task:
             return {**found, "several": bag.fibres}
         trial, notes = _trial(bag, task)
+        facts = _facts(trial)
+        if CONDITIONING_FOUND in notes:
+            facts["amplitude_l0"], facts["recovery_s"] = nominal(facts["amplitude_l0"], facts["recovery_s"])
         check_trial(trial, task["bag"])
         found |= {
             "notes": notes,
             "warnings": [line.replace(task["path"], task["bag"]) for line in trial.warnings],
-            "trial": {"path": task["path"], **_facts(trial)},
+            "trial": {"path": task["path"], **facts},
             "measured": answer(trial, trial.force_time_s, trial.measured_f0),
             "models": {},
             "missing": [],

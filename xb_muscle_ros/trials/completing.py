@@ -15,6 +15,7 @@ from xb_muscle_ros.trials.trial import Array, Trial
 
 # Digits of a pCa that is taken from calcium: 10^(6 - pCa) does not come back to the last bit.
 _PCA_DIGITS = 6
+CONDITIONING_FOUND = "amplitude and recovery found from length"
 _PHASES = "phases found from length"
 # A record moves where means of so many parts differ by this share of length, and by so many of their standard errors.
 _PARTS, _LEAST_MOVE, _ERRORS = 20, 3e-3, 8.0
@@ -86,7 +87,7 @@ def complete(reading: Reading, known: Known) -> tuple[Trial, tuple[str, ...]]:
         pca=pca_of(trial),
     )
     if (found.amplitude_l0, found.recovery_s) != (facts.amplitude_l0, facts.recovery_s):
-        notes.append("amplitude and recovery found from length")
+        notes.append(CONDITIONING_FOUND)
     if found.pca != facts.pca:
         notes.append("pCa taken from constant calcium")
     return replace(trial, facts=found), tuple(notes)
