@@ -114,6 +114,11 @@ def _change(text: str) -> tuple[str, float]:
         raise argparse.ArgumentTypeError(f"'{value}' in '{text}' is not a number") from None
 
 
+def add_overwrite(parser: argparse.ArgumentParser) -> None:
+    """The option that lets a run take the place of an older one."""
+    parser.add_argument("--overwrite", action="store_true", help="replace the results of an older run")
+
+
 def add_work(parser: argparse.ArgumentParser) -> None:
     """Options that pick where long work is done."""
     parser.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler (host:8786) whose workers do the work")

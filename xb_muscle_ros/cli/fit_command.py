@@ -6,8 +6,18 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xb_muscle_ros.cli.common import add_fibre, add_reading, add_work, fibre_of, study_of, warn, work_options_of
+from xb_muscle_ros.cli.common import (
+    add_fibre,
+    add_overwrite,
+    add_reading,
+    add_work,
+    fibre_of,
+    study_of,
+    warn,
+    work_options_of,
+)
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.files import matching, refuse_older
 
 if TYPE_CHECKING:
     from xb_muscle_ros.fit.coordinates import Choice
@@ -16,6 +26,8 @@ if TYPE_CHECKING:
 
     Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
 
+# What a fit leaves beside the fibre file and its journal.
+_WRITTEN = (r"fit\.json", r"trials(_\d+)?\.(png|pdf)", r"(features|profiles|correlation)\.(png|pdf)")
 _EPILOG = """RULE is KEY=VALUE with KEY one of trial (VALUE may have * and ?), pca, amplitude (L0), recovery (s): a
 trial meets it within what such conditions vary by. Faults of the measurement are pca_shift (per solution), length_gain,
 run_down, time_shift, transducer_lag (per study), force_offset and force_drift (per trial)."""
@@ -73,7 +85,7 @@ def add(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--no-intervals", action="store_true", help="leave the profiles out: the longest part of the work"
     )
-    parser.add_argument("--overwrite", action="store_true", help="replace results that exist")
+    add_overwrite(parser)
     add_work(parser)
     parser.set_defaults(run=run)
 
@@ -82,17 +94,18 @@ def run(arguments: argparse.Namespace) -> int:
     """Fit, print the tables, write the files."""
     from xb_muscle_ros.fit.report import as_json, table, write_fitted, write_json
     from xb_muscle_ros.fit.run import Settings, fit
+    from xb_muscle_ros.trials.bag_files import remove_results
 
     out = arguments.out
     if out.suffix not in (".yaml", ".yml"):
         raise UserError(f"--out is {out}; needed is the name of a fibre file, ending in .yaml")
-    if out.exists() and not arguments.overwrite:
-        raise UserError(f"{out} exists; use --overwrite to replace it or choose another name for --out")
+    folder = out.with_suffix("")
+    older = [*([out] if out.exists() else []), *matching(folder, *_WRITTEN)]
+    refuse_older(older, arguments.overwrite)
     if not 0.5 <= arguments.level < 1.0:
         raise UserError(f"--level is {arguments.level:g}; allowed is 0.5 up to below 1")
     trials = _trials(arguments)
     problem = _problem(arguments, trials)
-    folder = out.with_suffix("")
     fibre_of_trials = trials[0].facts.fibre if trials else arguments.features_of
     settings = Settings(arguments.starts, arguments.seed, None if arguments.no_intervals else arguments.level)
     fitted = fit(problem, settings, work_options_of(arguments, journal=folder / "journal.jsonl"))
@@ -108,6 +121,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(table(found))
     for line in found["warnings"]:
         warn(line)
+    remove_results(matching(folder, *_WRITTEN))
     write_json(folder / "fit.json", found)
     for path in _figures(folder, fitted, found):
         print(path)

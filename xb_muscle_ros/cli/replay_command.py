@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_fibre, add_reading, fibre_of, study_of, warn
+from xb_muscle_ros.cli.common import add_fibre, add_overwrite, add_reading, fibre_of, study_of, warn
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
@@ -28,13 +28,14 @@ def add(subparsers: Subparsers) -> None:
     )
     parser.add_argument("--substeps", type=int, default=1, help="steps between two samples (default 1, as the node)")
     parser.add_argument("--settle", type=float, help="isometric time before each trial, s (default: until at rest)")
+    add_overwrite(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Replay, print the table, write the files."""
     from xb_muscle_ros.errors import UserError
-    from xb_muscle_ros.replay.run import Player, replay, write_results
+    from xb_muscle_ros.replay.run import Player, check_room, replay, write_results
 
     if not 1 <= arguments.substeps <= 10000:
         raise UserError(f"--substeps is {arguments.substeps}; allowed is 1 to 10000")
@@ -49,6 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     for trial in trials:
         if trial.facts.fibre != fibre.name:
             warn(f"trial {trial.facts.trial} is of fibre {trial.facts.fibre}, replayed with parameters of {fibre.name}")
+    check_room(arguments.out, trials, arguments.overwrite)
     player: Player | None = None
     if arguments.live:
         # The one place where this command touches ROS, and only when asked to.

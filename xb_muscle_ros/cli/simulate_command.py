@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_fibre, fibre_of
+from xb_muscle_ros.cli.common import add_fibre, add_overwrite, fibre_of
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
@@ -40,12 +40,14 @@ def add(subparsers: Subparsers) -> None:
     )
     parser.add_argument("--prefix", default="simulated", help="begins the names of the bags (default 'simulated')")
     parser.add_argument("--out", type=Path, default=Path("bags"), help="folder for the bags (default 'bags')")
+    add_overwrite(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate and write."""
     from xb_muscle_ros.errors import UserError
+    from xb_muscle_ros.files import refuse_older
     from xb_muscle_ros.models.muscle import Muscle
     from xb_muscle_ros.replay.offline import as_simulated
     from xb_muscle_ros.trials.bags import write_trial
@@ -57,10 +59,14 @@ def run(arguments: argparse.Namespace) -> int:
     for pca in arguments.pca:
         if not 3.0 <= pca <= 12.0:
             raise UserError(f"--pca is {pca:g}; allowed is 3 to 12")
-    muscle = Muscle(fibre)
+    planned = []
     for pca, amplitude, recovery in itertools.product(arguments.pca, arguments.amplitude, arguments.recovery):
         protocol = StretchShortenStretch(amplitude, recovery)
         trial = protocol.trial(fibre.name, pca, arguments.rate)
+        planned.append((protocol, trial, arguments.out / f"{arguments.prefix}_{fibre.name}_{trial.facts.trial}"))
+    refuse_older([path for _, _, path in planned if path.exists()], arguments.overwrite)
+    muscle = Muscle(fibre)
+    for protocol, trial, path in planned:
         calcium = float(trial.calcium_um[0])
         corner_s, corner_l0 = protocol.corners()
         state = muscle.settle(0.0, calcium, arguments.settle)
@@ -71,7 +77,6 @@ def run(arguments: argparse.Namespace) -> int:
         trial = replace(trial, facts=replace(trial.facts, source=source))
         if arguments.as_measured:
             trial = replace(trial, force_time_s=trial.time_s, force_n=simulated.force_n)
-        path = arguments.out / f"{arguments.prefix}_{fibre.name}_{trial.facts.trial}"
         write_trial(path, trial, simulated)
         low, high = simulated.force_n.min(), simulated.force_n.max()
         print(f"{path}: {trial.time_s.size} samples, force {low:.3f} to {high:.3f} F0")

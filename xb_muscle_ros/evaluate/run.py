@@ -21,9 +21,10 @@ from xb_muscle_ros.evaluate.srs_scores import ALL_READINGS, READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, read_table, read_tables
 from xb_muscle_ros.evaluate.tables_text import write_csv
 from xb_muscle_ros.evaluate.trials import Trials, duplicates, srs_table
-from xb_muscle_ros.files import write_text
+from xb_muscle_ros.files import matching, write_text
 from xb_muscle_ros.models.fibre_file import fibre_folders, find_fibre_file, load_fibre
 from xb_muscle_ros.scores.enhancement import AFTER_S
+from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.trials.bags import find_bags
 from xb_muscle_ros.trials.completing import Known, counted
 from xb_muscle_ros.work import Options, run, stream
@@ -111,8 +112,16 @@ def evaluate(request: Request, tell: Callable[[str], None] = lambda line: None) 
     return results
 
 
+def older_results(out: Path) -> list[Path]:
+    """What an older evaluation left in a folder; not its journal, which holds what is computed already."""
+    tables = ("trials", "force_rmsd", "relative_srs", "srs_cells", "srs_rmsd")
+    figures = ("force_rmsd", "relative_srs", "srs_surfaces")
+    return matching(out, r"evaluate\.(json|md)", rf"({'|'.join(tables)})\.csv", rf"({'|'.join(figures)})\.(png|pdf)")
+
+
 def write(request: Request, results: Results) -> list[Path]:
-    """Write all files of the results; returns what to look at."""
+    """Write all files of the results in the place of an older evaluation's; returns what to look at."""
+    remove_results(older_results(request.out))
     return [*write_tables(request.out, results), *draw_figures(request.out, results)]
 
 
