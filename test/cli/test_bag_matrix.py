@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import csv
 import functools
-import importlib.util
 import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
+import foreign_bags as foreign
 import numpy as np
 import pytest
 import yaml
@@ -27,19 +26,6 @@ L0_M, F0_N = 0.0012, 0.0005
 KINDS = ("no_phases", "no_facts", "several_fibres", "split", "truncated", "shuffled")
 Right = Callable[[str], dict[str, float]]
 COMMANDS = ("replay", "evaluate", "fit", "diagnose")
-
-
-def _foreign() -> ModuleType:
-    path = Path(__file__).resolve().parents[1] / "trials" / "foreign_bags.py"
-    spec = importlib.util.spec_from_file_location("foreign_bags", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-foreign = _foreign()
 
 
 @pytest.fixture(scope="module")
@@ -225,3 +211,45 @@ def test_a_bag_of_any_kind_gives_the_numbers_of_the_own_one(
     for line in SAID[kind]:
         assert line.format(n=n) in said
     assert "Traceback" not in said
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_lengths_far_from_l0_are_one_line_in_every_command(
+    command: str, bags: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The fibre file knows of no L0 either: 1.2 mm would be 0.0012 L0."""
+    bag = next(iter(sorted(bags["no_facts"].iterdir())))
+    out = tmp_path / ("x.yaml" if command == "fit" else "out")
+    capsys.readouterr()
+    given = ["--fiber", "18Dec2017a", "--out", str(out)] + (["--processes", "0"] if command != "replay" else [])
+    assert main([command, str(bag), *given]) == 2
+    (said,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("xb_muscle: ")]
+    assert "length differs from L0 by -0.999 L0; allowed is -0.6 to 1" in said
+    assert "--reference-length gives another" in said
+    assert not [path for path in tmp_path.rglob("*") if path.is_file() and "journal" not in path.name]
+
+
+def test_l0_and_f0_of_the_command_line_are_as_good_as_those_of_a_bag(
+    bags: dict[str, Path], fibre: Path, right: Right, tmp_path: Path
+) -> None:
+    """With a normalised fibre file the user tells what the bags lack."""
+    text = fibre.read_text().replace(f"reference_length_m: {L0_M}", "reference_length_m: 1.0")
+    (tmp_path / "plain.yaml").write_text(text.replace(f"f0_n: {F0_N}", "f0_n: 1.0"))
+    given = ["--fiber", str(tmp_path / "plain.yaml"), "--reference-length", "1.2 mm", "--f0", "0.5 mN"]
+    assert main(["replay", str(bags["no_facts"]), *given, "--out", str(tmp_path / "out")]) == 0
+    rows = json.loads((tmp_path / "out" / "replay.json").read_text())["trials"]
+    for i, row in enumerate(rows):
+        assert row["rmsd_f0"]["whole"] == pytest.approx(right("replay")[f"{i} rmsd_whole"], rel=0.01)
+
+
+def test_evaluate_takes_every_fibre_that_has_a_file(
+    bags: dict[str, Path], fibre: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = tmp_path / "soleus.yaml"
+    other.write_text(fibre.read_text().replace("fibre: 18Dec2017a", "fibre: soleus"))
+    given = ["--fiber", str(fibre), str(other), "--model", "3state_coop", "--processes", "0"]
+    assert main(["evaluate", str(bags["several_fibres"]), *given, "--out", str(tmp_path / "out")]) == 0
+    found = json.loads((tmp_path / "out" / "evaluate.json").read_text())
+    assert found["trials"]["fibres"] == ["18Dec2017a", "soleus"]
+    assert found["trials"]["used"] == 6
+    assert "left out: 'gastrocnemius'" in capsys.readouterr().err

@@ -12,8 +12,8 @@ from xb_muscle_ros.files import matching, refuse_older, write_text
 from xb_muscle_ros.prove.counting import Score, by_size, calibration, scores
 from xb_muscle_ros.prove.judging import Judged, judge
 from xb_muscle_ros.prove.run import RESULTS
-from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.prove.sealing import load_benchmark, open_key
+from xb_muscle_ros.trials.bag_files import remove_results
 
 
 def score(results: Path, key: Path, out: Path, overwrite: bool = False) -> tuple[str, list[Path]]:

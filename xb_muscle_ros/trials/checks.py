@@ -15,8 +15,8 @@ CALCIUM_UM = 1e4
 USUAL_LENGTH_L0 = (0.5, 1.5)
 USUAL_PEAK_F0 = 3.0
 LEAST_PEAK_F0 = 3e-3
-# At this free calcium a fibre is active, µM (pCa 6).
-ACTIVE_UM = 1.0
+# At this free calcium a fibre is active, µM (pCa 6.3).
+ACTIVE_UM = 0.5
 _PCA_APART = 0.05
 # Above this pCa a fibre is relaxed, whatever stands for its calcium.
 _RELAXED_PCA = 8.0
