@@ -23,7 +23,11 @@ def generate_launch_description() -> LaunchDescription:
             "fiber_file", default_value="18Dec2017a", description="fibre file, a path or the name of a packaged fibre"
         ),
         DeclareLaunchArgument("model", default_value="3state_coop", description="parameter set of the fibre file"),
-        DeclareLaunchArgument("out", default_value="replay", description="folder for the report, figure and bags"),
+        DeclareLaunchArgument(
+            "out",
+            default_value="replay",
+            description="folder for the report, figure and bags; those of an older replay are replaced",
+        ),
     ]
     node = Node(
         package="xb_muscle_ros",
@@ -40,7 +44,7 @@ def generate_launch_description() -> LaunchDescription:
         cmd=[
             *(sys.executable, "-m", "xb_muscle_ros.cli.main", "replay", LaunchConfiguration("bags"), "--live"),
             *("--fiber", LaunchConfiguration("fiber_file"), "--model", LaunchConfiguration("model")),
-            *("--out", LaunchConfiguration("out")),
+            *("--out", LaunchConfiguration("out"), "--overwrite"),
         ],
         output="screen",
         on_exit=Shutdown(),

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from xb_muscle_ros.errors import UserError
@@ -41,3 +42,22 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file by way of `replaced`."""
     with replaced(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def matching(folder: Path, *patterns: str) -> list[Path]:
+    """Files of a folder whose whole name matches one of some regular expressions, sorted; none without the folder."""
+    if not folder.is_dir():
+        return []
+    named = re.compile("|".join(f"(?:{pattern})" for pattern in patterns))
+    return sorted(path for path in folder.iterdir() if named.fullmatch(path.name) and path.is_file())
+
+
+def refuse_older(found: Sequence[Path], overwrite: bool) -> None:
+    """Refuse to go on where results of an older run are there and may not be replaced.
+
+    Raises:
+        UserError: they are, and `overwrite` is not asked for.
+    """
+    if found and not overwrite:
+        more = f" and {len(found) - 1} more" if len(found) > 1 else ""
+        raise UserError(f"{found[0]}{more} exists; use --overwrite to replace it or choose another name for --out")

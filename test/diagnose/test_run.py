@@ -155,7 +155,11 @@ def swapped_channels(trials: list[Trial]) -> list[Trial]:
 
 def shuffled_calcium(trials: list[Trial]) -> list[Trial]:
     """What was recorded at high calcium is said to be of low calcium, and the reverse."""
-    return [replace(t, calcium_um=o.calcium_um) for t, o in zip(trials, reversed(trials), strict=True)]
+    others = [(trial.calcium_um, trial.facts.pca) for trial in reversed(trials)]
+    return [
+        replace(trial, calcium_um=calcium, facts=replace(trial.facts, pca=pca))
+        for trial, (calcium, pca) in zip(trials, others, strict=True)
+    ]
 
 
 def only_one(trials: list[Trial]) -> list[Trial]:

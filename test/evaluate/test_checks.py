@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.evaluate.checks import check_trial, pca_of
+from xb_muscle_ros.evaluate.checks import check_trial
+from xb_muscle_ros.trials.checks import check_values
+from xb_muscle_ros.trials.completing import pca_of
 from xb_muscle_ros.trials.trial import Trial
 
 Recorder = Callable[..., Trial]
@@ -29,8 +31,15 @@ def gap(trial: Trial) -> Trial:
     return replace(trial, force_time_s=trial.force_time_s[kept], force_n=trial.force_n[kept])
 
 
+def check(trial: Trial, where: str) -> tuple[str, ...]:
+    """As a bag of an evaluation is checked."""
+    lines = check_values(trial, where)
+    check_trial(trial, where)
+    return lines
+
+
 def test_a_good_trial_passes(good: Trial) -> None:
-    check_trial(good, "b")
+    assert check(good, "b") == ()
 
 
 @pytest.mark.parametrize(
@@ -39,7 +48,10 @@ def test_a_good_trial_passes(good: Trial) -> None:
         (lambda t: replace(t, force_time_s=np.empty(0), force_n=np.empty(0)), "no measured force on /muscle/measured"),
         (lambda t: replace(t, length_m=1000.0 * t.length_m), "length differs from L0 by 1.04e+03 L0; allowed is -0.6"),
         (lambda t: facts(t, reference_length_m=1000.0), "length differs from L0 by -0.999 L0; allowed is -0.6 to 1"),
-        (lambda t: replace(t, force_n=1000.0 * t.force_n), "allowed is -2 to 10: forces are in N, one F0 is f0_n, 1"),
+        (
+            lambda t: replace(t, force_n=1000.0 * t.force_n),
+            "allowed is -2 to 10: forces are in N, one F0 is 1 N (f0_n)",
+        ),
         (lambda t: replace(t, calcium_um=1e-6 * t.calcium_um), "pCa is 6.1 but calcium is 7.943e-07 µM, where 0.7943"),
         (lambda t: replace(t, calcium_um=-t.calcium_um), "calcium is -0.794 µM; allowed is 0 to 10000"),
         (lambda t: facts(replace(t, calcium_um=np.zeros(1)), pca=None), "pCa is missing: custom_data has no 'pca'"),
@@ -58,14 +70,14 @@ def test_a_good_trial_passes(good: Trial) -> None:
 )
 def test_faults_are_told_in_one_line(good: Trial, change: Callable[[Trial], Trial], words: str) -> None:
     with pytest.raises(UserError) as refused:
-        check_trial(change(good), "my/bag")
+        check(change(good), "my/bag")
     assert str(refused.value).startswith("bag my/bag: ")
     assert words in str(refused.value)
     assert "\n" not in str(refused.value)
 
 
 def test_relaxed_fibres_may_have_any_calcium_that_is_next_to_none(good: Trial) -> None:
-    check_trial(facts(replace(good, calcium_um=np.zeros(1)), pca=9.0), "b")
+    check(facts(replace(good, calcium_um=np.zeros(1)), pca=9.0), "b")
 
 
 def test_pca_comes_from_calcium_where_that_is_constant(good: Trial) -> None:

@@ -140,7 +140,9 @@ def test_run_then_score(benchmark_folder: Path, monkeypatch: pytest.MonkeyPatch)
     out = benchmark_folder / "r"
     done = run(benchmark_folder / "b", out, True, 1, Options(processes=0, quiet=True))
     assert done["cases"]["case_0010"]["error"] == "no force"
-    again = run(benchmark_folder / "b", out, True, 1, Options(processes=0, quiet=True))
+    with pytest.raises(UserError, match=r"results\.json exists; use --overwrite"):
+        run(benchmark_folder / "b", out, True, 1, Options(processes=0, quiet=True))
+    again = run(benchmark_folder / "b", out, True, 1, Options(processes=0, quiet=True), overwrite=True)
     assert seen == sorted(SAID)
     assert again == done
     text, files = score(out, benchmark_folder / "key.json", benchmark_folder / "s")
@@ -163,6 +165,8 @@ def test_another_key_is_refused(benchmark_folder: Path, capsys: pytest.CaptureFi
     content["cases"][0]["kind"] = "single"
     key.write_text(json.dumps(content))
     assert main(arguments) == 2
+    assert "exists; use --overwrite" in capsys.readouterr().err
+    assert main([*arguments, "--overwrite"]) == 2
     assert "sealed with" in capsys.readouterr().err
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bags import Simulated
 from xb_muscle_ros.trials.simulated import MOMENTS
 from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))  # for foreign_bags
 
 RawMessage = tuple[str, int, bytes]
 

@@ -15,7 +15,9 @@ from mcap.writer import Writer as McapWriter
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bags import Simulated, read_simulated, read_trial, write_trial
+from xb_muscle_ros.trials.completing import Known
 from xb_muscle_ros.trials.mcap_records import read_recording
+from xb_muscle_ros.trials.study import read_study
 from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
 
 FACTS = TrialFacts("f", "t", pca=6.0, reference_length_m=0.5, phases=(Phase("isometric", 0.0, 0.039),))
@@ -130,12 +132,17 @@ def test_with_all_facts_lost_the_data_tell_what_they_can(tmp_path: Path, trial: 
     assert 1 < read.time_s.size < 200
     assert read.facts.fibre == "18Dec2017a"  # from the messages
     assert read.facts.trial == "bag"
-    assert read.facts.pca == pytest.approx(6.5)
-    assert read.facts.reference_length_m == 5e-4  # 0.5 mm is no fibre of 1 m
     (warning,) = read.warnings
     assert "metadata.yaml is missing" in warning
     assert "cut short after 12000 bytes" in warning
-    assert "0.0005 m is taken for L0" in warning
+    assert "trial facts are lost" in warning
+    # 0.5 mm is no fibre of 1 m; who knows better may say so.
+    with pytest.raises(UserError, match=r"length differs from L0 by -1 L0; .*--reference-length gives another"):
+        read_study([tmp_path / "bag"], "18Dec2017a", Known())
+    (completed,), notes = read_study([tmp_path / "bag"], "18Dec2017a", Known(first_isometric=True))
+    assert completed.facts.reference_length_m == pytest.approx(5e-4)
+    assert completed.facts.pca == pytest.approx(6.5)
+    assert "pCa taken from constant calcium (1 trial)" in notes
 
 
 def test_a_file_given_by_itself_finds_its_facts_in_the_folder(tmp_path: Path, trial: Trial) -> None:

@@ -247,7 +247,7 @@ NAMELESS = (500_000, ros_types.joint_state(500_000, [], position=np.array([1.0])
         ({**GOOD, "/muscle/length": [_position(0, 1.0), NAMELESS]}, ["/muscle/length", "message 1", "empty name"]),
         ({**GOOD, "/muscle/length": [_position(0, 1.0), _position(9, np.nan)]}, ["/muscle/length", "message 1", "nan"]),
         ({**GOOD, "/muscle/calcium": [_position(0, np.inf)]}, ["/muscle/calcium", "message 0", "inf"]),
-        ({**GOOD, "/muscle/length": [_position(0, 1.0), _position(9, 1.0, "g")]}, ["message 1", "'g'", "'f'"]),
+        ({**GOOD, "/muscle/length": [_position(0, 1.0), _position(9, 1.0, "g")]}, ["of fibres 'f', 'g'"]),
         ({**GOOD, "/muscle/measured_force": [_position(7, 1.0)]}, ["/muscle/measured_force", "empty effort"]),
         ({**GOOD, "/muscle/length": [(0, b"\x00\x01")]}, ["/muscle/length", "message 0", "decoded"]),
     ],

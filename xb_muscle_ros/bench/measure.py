@@ -53,19 +53,10 @@ def as_text(figures: Sequence[Figure]) -> str:
     return "\n".join(lines)
 
 
-def merge_into(path: Path, figures: Sequence[Figure], machine: dict[str, object]) -> None:
-    """Write figures to ``bench.json``; entries of other names that are there already stay."""
-    kept: list[dict[str, object]] = []
-    if path.is_file():
-        try:
-            kept = [
-                entry for entry in json.loads(path.read_text(encoding="utf-8"))["figures"] if isinstance(entry, dict)
-            ]
-        except (ValueError, KeyError, TypeError):
-            kept = []
-    names = {f.name for f in figures}
-    entries = [e for e in kept if e.get("name") not in names] + [asdict(f) for f in figures]
-    write_text(path, json.dumps({"machine": machine, "figures": entries}, indent=1) + "\n")
+def write(path: Path, figures: Sequence[Figure], machine: dict[str, object]) -> None:
+    """Write figures to ``bench.json``."""
+    tree = {"machine": machine, "figures": [asdict(figure) for figure in figures]}
+    write_text(path, json.dumps(tree, indent=1) + "\n")
 
 
 def machine() -> dict[str, object]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_fibre, warn
+from xb_muscle_ros.cli.common import add_fibre, add_overwrite, warn
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
@@ -35,16 +36,24 @@ def add(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--out", type=Path, default=Path("bench.json"), help="file for the figures (default bench.json)"
     )
+    add_overwrite(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, print, write."""
     from xb_muscle_ros.bench import right_hand_side, trial_time
-    from xb_muscle_ros.bench.measure import Figure, as_text, machine, merge_into
+    from xb_muscle_ros.bench.measure import Figure, as_text, machine, write
     from xb_muscle_ros.cli.common import fibre_of
+    from xb_muscle_ros.files import matching, refuse_older
     from xb_muscle_ros.models.muscle import Muscle
+    from xb_muscle_ros.trials.bag_files import remove_results
 
+    older = matching(arguments.out.parent, re.escape(arguments.out.name))
+    drawn = [name for study, name in (("cost", "cost"), ("fast", "fast_stretch")) if older or study in arguments.study]
+    older += matching(arguments.out.parent, *(rf"{name}\.(png|pdf)" for name in drawn))
+    refuse_older(older, arguments.overwrite)
+    remove_results(older)
     fibre = fibre_of(arguments)
     made: list[Figure] = []
     if "rhs" in arguments.study or "trial" in arguments.study:
@@ -100,6 +109,6 @@ def run(arguments: argparse.Namespace) -> int:
 
         made += soak.figures(fibre, arguments.ticks)
     print(as_text(made))
-    merge_into(arguments.out, made, machine())
+    write(arguments.out, made, machine())
     print(arguments.out)
     return 0

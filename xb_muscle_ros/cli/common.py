@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from xb_muscle_ros.models.fibre_file import Fibre
+    from xb_muscle_ros.trials.completing import Known
+    from xb_muscle_ros.trials.study import Study
     from xb_muscle_ros.work import Options
 
     Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -41,6 +43,66 @@ def fibre_of(arguments: argparse.Namespace) -> Fibre:
     return changed(fibre, dict(arguments.changes), "--set")
 
 
+def add_reading(parser: argparse.ArgumentParser, several: bool = False) -> None:
+    """Options on how bags are read.
+
+    Args:
+        parser: of the command.
+        several: the command takes trials of several fibres in one run.
+    """
+    parser.add_argument(
+        "--reference-length", metavar="LENGTH",
+        help="the length that is L0, for example '30 mm', or 'first_isometric': the length before the first stretch "
+        "(default: what the bag tells, else the fibre file)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--f0", metavar="FORCE",
+        help="the force that is F0, for example '0.5 mN' (default: what the bag tells, else the fibre file)",
+    )  # fmt: skip
+    whose = "that has a file" if several else "of the parameters"
+    parser.add_argument("--trials-of", metavar="FIBER", help=f"take this fibre's trials of the bags (default: {whose})")
+
+
+def known_of(arguments: argparse.Namespace) -> Known:
+    """What the options tell of L0 and F0.
+
+    Raises:
+        UserError: an option is no length or no force.
+    """
+    from xb_muscle_ros.errors import UserError
+    from xb_muscle_ros.trials.completing import Known
+    from xb_muscle_ros.trials.readers.units import quantity
+
+    def value(option: str, text: str | None, kind: str, example: str) -> float | None:
+        if text is None:
+            return None
+        found = quantity(text, kind, "value", option, example)
+        if found.kind != kind:
+            raise UserError(f"{option} is '{text}'; needed is a {kind}, for example '{example}'")
+        return found.value
+
+    first = arguments.reference_length == "first_isometric"
+    return Known(
+        None if first else value("--reference-length", arguments.reference_length, "length", "30 mm"),
+        first,
+        value("--f0", arguments.f0, "force", "0.5 mN"),
+    )
+
+
+def study_of(arguments: argparse.Namespace, fibre: Fibre) -> Study:
+    """The trials of the bags that the options name; what there is to say of them is said.
+
+    Raises:
+        UserError: see `read_study`.
+    """
+    from xb_muscle_ros.trials.study import read_study
+
+    study = read_study(arguments.bags, fibre.name, known_of(arguments).of_file(fibre), arguments.trials_of)
+    for line in study.lines:
+        warn(line)
+    return study
+
+
 def _change(text: str) -> tuple[str, float]:
     """Name and value of ``NAME=VALUE``; argparse makes one line of the error."""
     name, equals, value = text.partition("=")
@@ -50,6 +112,11 @@ def _change(text: str) -> tuple[str, float]:
         return name.strip(), float(value)
     except ValueError:
         raise argparse.ArgumentTypeError(f"'{value}' in '{text}' is not a number") from None
+
+
+def add_overwrite(parser: argparse.ArgumentParser) -> None:
+    """The option that lets a run take the place of an older one."""
+    parser.add_argument("--overwrite", action="store_true", help="replace the results of an older run")
 
 
 def add_work(parser: argparse.ArgumentParser) -> None:

@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_work, warn, work_options_of
-from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.cli.common import add_overwrite, add_reading, add_work, known_of, warn, work_options_of
 
 if TYPE_CHECKING:
     Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -26,21 +25,23 @@ def add(subparsers: Subparsers) -> None:
     )
     parser.add_argument("--model", help="parameter set of the fibre file (default: the one the file names)")
     parser.add_argument("--method", help="how heads are distributed over strain (default: the fibre file's)")
+    add_reading(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for report and results")
     parser.add_argument("--quick", action="store_true", help="look less hard: minutes become tens of seconds")
     parser.add_argument("--seed", type=int, default=1, help="of the bootstrap (default 1)")
-    parser.add_argument("--overwrite", action="store_true", help="replace a diagnosis that exists")
+    add_overwrite(parser)
     add_work(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, print the answer, say where the report is."""
+    from xb_muscle_ros.diagnose.outcome import older_results
     from xb_muscle_ros.diagnose.run import diagnose_bags
+    from xb_muscle_ros.files import refuse_older
 
     out: Path = arguments.out
-    if (out / "diagnosis.json").exists() and not arguments.overwrite:
-        raise UserError(f"{out} holds a diagnosis; use --overwrite to replace it or choose another folder for --out")
+    refuse_older(older_results(out), arguments.overwrite)
     found = diagnose_bags(
         arguments.bags,
         arguments.fiber,
@@ -50,6 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.model,
         arguments.method,
         work_options_of(arguments, journal=out / "journal.jsonl"),
+        known=known_of(arguments),
+        only=arguments.trials_of,
     )
     for line in found["warnings"]:
         warn(line)

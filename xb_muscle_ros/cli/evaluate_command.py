@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_work, warn, work_options_of
+from xb_muscle_ros.cli.common import add_overwrite, add_reading, add_work, known_of, warn, work_options_of
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
@@ -25,6 +25,7 @@ def add(subparsers: Subparsers) -> None:
         "--fiber", "--fibre", dest="fiber", nargs="+", default=[], metavar="FIBER",
         help="fibre files or names (default: the package's file of a bag's fibre; with --paper all that were measured)",
     )  # fmt: skip
+    add_reading(parser, several=True)
     parser.add_argument("--model", nargs="+", help="parameter sets (default: all that the fibre files have)")
     parser.add_argument("--method", help="how heads are distributed over strain (default: the fibre file's)")
     parser.add_argument("--settle", type=float, help="isometric time before each trial, s (default: until at rest)")
@@ -36,6 +37,7 @@ def add(subparsers: Subparsers) -> None:
     parser.add_argument("--empirical", type=Path, metavar="JSON", help="measured SRS of all fibres: empirical_srs.json")
     parser.add_argument("--golden", type=Path, metavar="JSON", help="the authors' released output: golden_srs.json")
     parser.add_argument("--out", type=Path, required=True, help="folder for evaluate.json, tables and figures")
+    add_overwrite(parser)
     add_work(parser)
     parser.set_defaults(run=run)
 
@@ -44,7 +46,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Evaluate, print the tables, write the files."""
     from xb_muscle_ros.errors import UserError
     from xb_muscle_ros.evaluate.report import comparison_table, force_table, readings_with_conditions, srs_table_text
-    from xb_muscle_ros.evaluate.run import Request, evaluate, write
+    from xb_muscle_ros.evaluate.run import Request, evaluate, older_results, write
+    from xb_muscle_ros.files import refuse_older
     from xb_muscle_ros.models.registry import METHODS, split_set
 
     if arguments.paper != (arguments.empirical is not None):
@@ -57,6 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise UserError("--measured-only has no models; drop it, or --paper, --model and --fiber")
     if arguments.settle is not None and not 0.0 < arguments.settle <= 1e6:
         raise UserError(f"--settle is {arguments.settle:g} s; allowed is above 0 to 1e6")
+    refuse_older(older_results(arguments.out), arguments.overwrite)
     for name in arguments.model or ():
         split_set(name)
     if arguments.method is not None and arguments.method not in METHODS:
@@ -73,6 +77,8 @@ def run(arguments: argparse.Namespace) -> int:
         golden=arguments.golden,
         out=arguments.out,
         work=work_options_of(arguments),
+        known=known_of(arguments),
+        only=arguments.trials_of,
     )
     results = evaluate(request, warn)
     for line in results.warnings:

@@ -6,8 +6,18 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xb_muscle_ros.cli.common import add_fibre, add_work, fibre_of, warn, work_options_of
+from xb_muscle_ros.cli.common import (
+    add_fibre,
+    add_overwrite,
+    add_reading,
+    add_work,
+    fibre_of,
+    study_of,
+    warn,
+    work_options_of,
+)
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.files import matching, refuse_older
 
 if TYPE_CHECKING:
     from xb_muscle_ros.fit.coordinates import Choice
@@ -16,6 +26,8 @@ if TYPE_CHECKING:
 
     Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
 
+# What a fit leaves beside the fibre file and its journal.
+_WRITTEN = (r"fit\.json", r"trials(_\d+)?\.(png|pdf)", r"(features|profiles|correlation)\.(png|pdf)")
 _EPILOG = """RULE is KEY=VALUE with KEY one of trial (VALUE may have * and ?), pca, amplitude (L0), recovery (s): a
 trial meets it within what such conditions vary by. Faults of the measurement are pca_shift (per solution), length_gain,
 run_down, time_shift, transducer_lag (per study), force_offset and force_drift (per trial)."""
@@ -31,6 +43,7 @@ def add(subparsers: Subparsers) -> None:
     )
     parser.add_argument("bags", nargs="*", metavar="BAG", help="bags or folders of bags, in the order of recording")
     add_fibre(parser)
+    add_reading(parser)
     parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="fibre file to write")
     parser.add_argument("--hold-out", nargs="+", default=[], metavar="RULE", help="keep these trials out of the fit")
     parser.add_argument("--train", nargs="+", default=[], metavar="RULE", help="fit to these trials only")
@@ -72,7 +85,7 @@ def add(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--no-intervals", action="store_true", help="leave the profiles out: the longest part of the work"
     )
-    parser.add_argument("--overwrite", action="store_true", help="replace results that exist")
+    add_overwrite(parser)
     add_work(parser)
     parser.set_defaults(run=run)
 
@@ -81,17 +94,18 @@ def run(arguments: argparse.Namespace) -> int:
     """Fit, print the tables, write the files."""
     from xb_muscle_ros.fit.report import as_json, table, write_fitted, write_json
     from xb_muscle_ros.fit.run import Settings, fit
+    from xb_muscle_ros.trials.bag_files import remove_results
 
     out = arguments.out
     if out.suffix not in (".yaml", ".yml"):
         raise UserError(f"--out is {out}; needed is the name of a fibre file, ending in .yaml")
-    if out.exists() and not arguments.overwrite:
-        raise UserError(f"{out} exists; use --overwrite to replace it or choose another name for --out")
+    folder = out.with_suffix("")
+    older = [*([out] if out.exists() else []), *matching(folder, *_WRITTEN)]
+    refuse_older(older, arguments.overwrite)
     if not 0.5 <= arguments.level < 1.0:
         raise UserError(f"--level is {arguments.level:g}; allowed is 0.5 up to below 1")
     trials = _trials(arguments)
     problem = _problem(arguments, trials)
-    folder = out.with_suffix("")
     fibre_of_trials = trials[0].facts.fibre if trials else arguments.features_of
     settings = Settings(arguments.starts, arguments.seed, None if arguments.no_intervals else arguments.level)
     fitted = fit(problem, settings, work_options_of(arguments, journal=folder / "journal.jsonl"))
@@ -107,6 +121,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(table(found))
     for line in found["warnings"]:
         warn(line)
+    remove_results(matching(folder, *_WRITTEN))
     write_json(folder / "fit.json", found)
     for path in _figures(folder, fitted, found):
         print(path)
@@ -123,16 +138,11 @@ def _figures(folder: Path, fitted: Any, found: dict[str, Any]) -> list[Path]:
 
 
 def _trials(arguments: argparse.Namespace) -> list[Trial]:
-    from xb_muscle_ros.trials.bags import find_bags, read_trial
-
     if not arguments.bags and arguments.features is None:
         raise UserError("nothing to fit to; give bags of trials, or --features")
     if not arguments.bags and arguments.features_of is None:
         raise UserError("without bags nobody knows whose features to fit; give --features-of")
-    trials = [read_trial(path) for path in find_bags(arguments.bags)] if arguments.bags else []
-    for trial in trials:
-        for warning in trial.warnings:
-            warn(warning)
+    trials = study_of(arguments, fibre_of(arguments)).trials if arguments.bags else []
     fibres = dict.fromkeys(trial.facts.fibre for trial in trials)
     if len(fibres) > 1:
         raise UserError(f"trials are of fibres {', '.join(fibres)}; fit one fibre at a time")

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import warn
+from xb_muscle_ros.cli.common import add_overwrite, warn
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
@@ -45,6 +45,7 @@ def add(subparsers: Subparsers) -> None:
     ankle.add_argument("--displacement", type=float, metavar="M", help="default -0.075: backwards")
     ankle.add_argument("--speed", type=float, metavar="M_PER_S", help="default 0.2")
     ankle.add_argument("--acceleration", type=float, metavar="M_PER_S2", help="default 2")
+    add_overwrite(parser)
     parser.set_defaults(run=run)
 
 
@@ -52,6 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Run all models, print the table, write the files."""
     from xb_muscle_ros.errors import UserError
     from xb_muscle_ros.figures.loop_figure import draw_loop
+    from xb_muscle_ros.files import matching, refuse_older
     from xb_muscle_ros.plant.loop import DURATION_S, run_ankle, run_knee
     from xb_muscle_ros.plant.plant import Plant
     from xb_muscle_ros.plant.report import table, write
@@ -59,6 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     if arguments.live and (len(arguments.models or ()) != 1 or arguments.models == ["mujoco"]):
         raise UserError("--live is for the one model that the node has; give one --model, and not mujoco")
+    # All are written anew by every run: nothing that is stale can stay.
+    refuse_older(matching(arguments.out, r"loop\.(json|csv|png|pdf)"), arguments.overwrite)
     scene, elastic = arguments.scene, arguments.elastic_tendon
     duration = DURATION_S[scene] if arguments.duration is None else arguments.duration
     if not 0.01 <= duration <= 60.0:

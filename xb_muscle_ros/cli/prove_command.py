@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_work, work_options_of
+from xb_muscle_ros.cli.common import add_overwrite, add_work, work_options_of
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
@@ -28,6 +28,7 @@ def add(subparsers: Subparsers) -> None:
     make.add_argument("--seed", type=int, required=True, metavar="S", help="decides everything: keep it as the key")
     make.add_argument("--key", type=Path, required=True, metavar="FILE", help="file for the truths, outside of DIR")
     make.add_argument("--method", default="gaussian", help="method that the fibre files name (default: gaussian)")
+    add_overwrite(make)
     add_work(make)
     make.set_defaults(run=_make)
     spike = steps.add_parser("spike", help="add the force of concealed effects to a recorded study")
@@ -37,6 +38,7 @@ def add(subparsers: Subparsers) -> None:
     spike.add_argument("--cases", type=int, required=True, metavar="N", help="how many")
     spike.add_argument("--seed", type=int, required=True, metavar="S", help="decides everything: keep it as the key")
     spike.add_argument("--key", type=Path, required=True, metavar="FILE", help="file for the truths, outside of DIR")
+    add_overwrite(spike)
     add_work(spike)
     spike.set_defaults(run=_spike)
     run = steps.add_parser("run", help="diagnose every case, without the key")
@@ -44,12 +46,14 @@ def add(subparsers: Subparsers) -> None:
     run.add_argument("--out", type=Path, required=True, metavar="RESULTS", help="folder for the diagnoses")
     run.add_argument("--quick", action="store_true", help="the tool's quick way")
     run.add_argument("--tool-seed", type=int, default=1, metavar="S", help="seed of the tool (default: 1)")
+    add_overwrite(run)
     add_work(run)
     run.set_defaults(run=_run)
     score = steps.add_parser("score", help="open the key and score the diagnoses")
     score.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'prove run' wrote")
     score.add_argument("--key", type=Path, required=True, metavar="FILE", help="the key")
     score.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for scores and figures")
+    add_overwrite(score)
     score.set_defaults(run=_score)
 
 
@@ -58,7 +62,9 @@ def _make(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.prove.make import make
 
     options = _checked(arguments, "prove make")
-    sealed = make(arguments.out, arguments.cases, arguments.seed, arguments.key, arguments.method, options)
+    sealed = make(
+        arguments.out, arguments.cases, arguments.seed, arguments.key, arguments.method, options, arguments.overwrite
+    )
     return _sealed(arguments, sealed)
 
 
@@ -68,7 +74,14 @@ def _spike(arguments: argparse.Namespace) -> int:
 
     options = _checked(arguments, "prove spike")
     sealed = spike(
-        arguments.bags, arguments.fiber, arguments.out, arguments.cases, arguments.seed, arguments.key, options
+        arguments.bags,
+        arguments.fiber,
+        arguments.out,
+        arguments.cases,
+        arguments.seed,
+        arguments.key,
+        options,
+        arguments.overwrite,
     )
     return _sealed(arguments, sealed)
 
@@ -101,7 +114,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.prove.run import RESULTS, run
 
     options = work_options_of(arguments, "prove run")
-    results = run(arguments.folder, arguments.out, arguments.quick, arguments.tool_seed, options)
+    results = run(arguments.folder, arguments.out, arguments.quick, arguments.tool_seed, options, arguments.overwrite)
     failed = {name: found["error"] for name, found in results["cases"].items() if "error" in found}
     for name, why in failed.items():
         warn(f"{name}: {why}")
@@ -113,7 +126,7 @@ def _score(arguments: argparse.Namespace) -> int:
     """Score, print the table, write scores and figures."""
     from xb_muscle_ros.prove.score import score
 
-    text, files = score(arguments.results, arguments.key, arguments.out)
+    text, files = score(arguments.results, arguments.key, arguments.out, arguments.overwrite)
     print(text)
     for path in files:
         print(path)

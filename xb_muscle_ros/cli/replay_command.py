@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_fibre, fibre_of, warn
+from xb_muscle_ros.cli.common import add_fibre, add_overwrite, add_reading, fibre_of, study_of, warn
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
@@ -21,12 +21,14 @@ def add(subparsers: Subparsers) -> None:
     )
     parser.add_argument("bags", nargs="+", metavar="BAG", help="bag folder, .mcap file, or folder of bags")
     add_fibre(parser)
+    add_reading(parser)
     parser.add_argument("--out", type=Path, required=True, help="folder for replay.json, figures and simulated bags")
     parser.add_argument(
         "--live", action="store_true", help="play the bags through a running muscle_node (mode lockstep)"
     )
     parser.add_argument("--substeps", type=int, default=1, help="steps between two samples (default 1, as the node)")
     parser.add_argument("--settle", type=float, help="isometric time before each trial, s (default: until at rest)")
+    add_overwrite(parser)
     parser.set_defaults(run=run)
 
 
@@ -34,8 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Replay, print the table, write the files."""
     from xb_muscle_ros.errors import UserError
     from xb_muscle_ros.replay.offline import pushing
-    from xb_muscle_ros.replay.run import Player, replay, write_results
-    from xb_muscle_ros.trials.bags import find_bags, read_trial
+    from xb_muscle_ros.replay.run import Player, check_room, replay, write_results
 
     if not 1 <= arguments.substeps <= 10000:
         raise UserError(f"--substeps is {arguments.substeps}; allowed is 1 to 10000")
@@ -46,12 +47,11 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.live and arguments.changes:
         raise UserError("--live gives the node a fibre file as it is; put the values of --set into a file of your own")
     fibre = fibre_of(arguments)
-    trials = [read_trial(path) for path in find_bags(arguments.bags)]
+    trials = study_of(arguments, fibre).trials
     for trial in trials:
-        for warning in trial.warnings:
-            warn(warning)
         if trial.facts.fibre != fibre.name:
             warn(f"trial {trial.facts.trial} is of fibre {trial.facts.fibre}, replayed with parameters of {fibre.name}")
+    check_room(arguments.out, trials, arguments.overwrite)
     player: Player | None = None
     if arguments.live:
         # The one place where this command touches ROS, and only when asked to.

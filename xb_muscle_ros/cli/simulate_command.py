@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_fibre, fibre_of, warn
+from xb_muscle_ros.cli.common import add_fibre, add_overwrite, fibre_of, warn
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
@@ -49,12 +49,14 @@ def add(subparsers: Subparsers) -> None:
     )
     parser.add_argument("--prefix", default="simulated", help="begins the names of the bags (default 'simulated')")
     parser.add_argument("--out", type=Path, default=Path("bags"), help="folder for the bags (default 'bags')")
+    add_overwrite(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate and write."""
     from xb_muscle_ros.errors import naming
+    from xb_muscle_ros.files import refuse_older
     from xb_muscle_ros.models.muscle import Muscle
     from xb_muscle_ros.replay.offline import as_simulated, pushing
     from xb_muscle_ros.trials.bags import write_trial
@@ -65,10 +67,14 @@ def run(arguments: argparse.Namespace) -> int:
         for number in value if isinstance(value, list) else [] if value is None else [value]:
             ALLOWED[name].check(f"--{option}", number)
     fibre = fibre_of(arguments)
-    muscle = Muscle(fibre)
+    planned = []
     for pca, amplitude, recovery in itertools.product(arguments.pca, arguments.amplitude, arguments.recovery):
         protocol = StretchShortenStretch(amplitude, recovery)
         trial = protocol.trial(fibre.name, pca, arguments.rate)
+        planned.append((protocol, trial, arguments.out / f"{arguments.prefix}_{fibre.name}_{trial.facts.trial}"))
+    refuse_older([path for _, _, path in planned if path.exists()], arguments.overwrite)
+    muscle = Muscle(fibre)
+    for protocol, trial, path in planned:
         calcium = float(trial.calcium_um[0])
         corner_s, corner_l0 = protocol.corners()
         with naming(f"trial {trial.facts.trial}"):
@@ -80,7 +86,6 @@ def run(arguments: argparse.Namespace) -> int:
         trial = replace(trial, facts=replace(trial.facts, source=source))
         if arguments.as_measured:
             trial = replace(trial, force_time_s=trial.time_s, force_n=simulated.force_n)
-        path = arguments.out / f"{arguments.prefix}_{fibre.name}_{trial.facts.trial}"
         write_trial(path, trial, simulated)
         low, high = simulated.force_n.min(), simulated.force_n.max()
         told = pushing(trial, simulated, fibre.model)

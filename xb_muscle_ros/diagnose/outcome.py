@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,9 +26,10 @@ from xb_muscle_ros.diagnose.search import Search
 from xb_muscle_ros.diagnose.significance import Significance
 from xb_muscle_ros.diagnose.study import Study
 from xb_muscle_ros.diagnose.verdict import Decision
-from xb_muscle_ros.files import replaced, write_text
+from xb_muscle_ros.files import matching, replaced, write_text
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.fibre_writing import write_fibre
+from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.trials.bag_writing import write_trial
 from xb_muscle_ros.trials.trial import Trial
 
@@ -91,14 +93,21 @@ class Outcome:
         return bool(self.shown.explanation.mechanisms)
 
 
+def older_results(out: Path) -> list[Path]:
+    """What an older diagnosis left in a folder; not its journal, which holds what is computed already."""
+    files = matching(out, r"diagnosis\.json", re.escape(AUGMENTED), r"traces\.npz", r"report\.html")
+    return [*files, *([out / NEXT] if (out / NEXT).is_dir() else [])]
+
+
 def write(out: Path, o: Outcome, found: dict[str, Any], report: bool = True) -> None:
-    """Write all files of a diagnosis; each appears whole or not at all.
+    """Write all files of a diagnosis in the place of an older one's; each appears whole or not at all.
 
     Raises:
         UserError: the folder cannot be written.
     """
     from xb_muscle_ros.diagnose.report import write_report
 
+    remove_results(older_results(out))
     if o.augmented:
         write_fibre(out / AUGMENTED, augmented_fibre(o), _comments(o))
     if o.proposal is not None:

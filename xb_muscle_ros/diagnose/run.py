@@ -29,7 +29,8 @@ from xb_muscle_ros.diagnose.verdict import Decision, Evidence, decide, explained
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
-from xb_muscle_ros.trials.bags import find_bags, read_trial
+from xb_muscle_ros.trials.completing import Known
+from xb_muscle_ros.trials.study import read_study
 from xb_muscle_ros.trials.trial import Trial
 from xb_muscle_ros.work import Options
 
@@ -47,6 +48,8 @@ def diagnose_bags(
     method: str | None = None,
     options: Options | None = None,
     report: bool = True,
+    known: Known | None = None,
+    only: str | None = None,
 ) -> dict[str, Any]:
     """Diagnose the trials of some bags and write what was found.
 
@@ -59,6 +62,8 @@ def diagnose_bags(
         model, method: of the fibre file; its own where None.
         options: where work is done; finished work is kept in `out`.
         report: write the page as well.
+        known: what is known of L0 and F0 beside bags and fibre file.
+        only: take trials of this fibre and no other.
 
     Returns:
         what `diagnosis.json` holds.
@@ -66,13 +71,14 @@ def diagnose_bags(
     Raises:
         UserError: bags that cannot be read or do not belong together, no force, no solution at the start.
     """
-    trials = [read_trial(path) for path in find_bags(list(bags))]
-    if not trials:
+    if not bags:
         raise UserError("there are no bags to diagnose; give at least one")
     fibre = load_fibre(fiber, model, method)
+    trials, notes = read_study(bags, fibre.name, (known or Known()).of_file(fibre), only)
     options = options or Options(processes=0, quiet=True)
     options = replace(options, journal=options.journal or out / "journal.jsonl")
     outcome = diagnose(trials, fibre, QUICK if quick else Effort(), seed, options)
+    outcome = replace(outcome, warnings=(*notes, *outcome.warnings))
     found = as_json(outcome, quick)
     write(out, outcome, found, report)
     return found

@@ -5,23 +5,27 @@ from __future__ import annotations
 import functools
 import hashlib
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.evaluate.checks import check_trial, pca_of
-from xb_muscle_ros.models.fibre_file import base_set, fibre_folders, find_fibre_file, load_fibre
+from xb_muscle_ros.evaluate.checks import check_trial
+from xb_muscle_ros.models.fibre_file import Fibre, base_set, fibre_folders, find_fibre_file, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.scores.conditions import nominal
 from xb_muscle_ros.scores.enhancement import AFTER_S, enhancement
 from xb_muscle_ros.scores.isometric import isometric_force
 from xb_muscle_ros.scores.redevelopment import redevelopment, restretch_end, still_until
 from xb_muscle_ros.scores.rmsd import force_rmsd, windows
 from xb_muscle_ros.scores.stiffness import stiffness_of_phase
 from xb_muscle_ros.trials.bag_files import METADATA
-from xb_muscle_ros.trials.bags import read_trial
+from xb_muscle_ros.trials.bag_reading import TrialBag
+from xb_muscle_ros.trials.completing import CONDITIONING_FOUND, Known, pca_of
+from xb_muscle_ros.trials.study import left_out, trial_of_bag
 from xb_muscle_ros.trials.trial import Array, Trial
 
 Task = dict[str, Any]
@@ -40,6 +44,8 @@ def tasks(
     method: str | None,
     settle_s: float | None = None,
     measured_only: bool = False,
+    known: Known | None = None,
+    only: str | None = None,
 ) -> list[Task]:
     """One task for each bag.
 
@@ -50,6 +56,8 @@ def tasks(
         method: see `load_fibre`.
         settle_s: see `simulate_trial`.
         measured_only: no model at all.
+        known: what is known of L0 and F0 beside bags and fibre files.
+        only: take trials of this fibre and no other.
     """
     files = None if fibres is None else {name: str(path.absolute()) for name, path in fibres.items()}
     shared = {
@@ -60,25 +68,60 @@ def tasks(
         "method": method,
         "settle_s": settle_s,
         "measured_only": measured_only,
+        "known": asdict(known or Known()),
+        "trials_of": only,
     }
     # Workers may stand in another folder; messages name bags as the user did.
     return [{"bag": str(bag), "path": str(bag.absolute()), "state": _file_state(bag), **shared} for bag in bags]
+
+
+def tasks_of_fibres(task: Mapping[str, Any], found: Mapping[str, Any]) -> tuple[list[Task], str | None]:
+    """Tasks for a bag of several fibres, one for each trial that is taken, and a line on those that are not.
+
+    Args:
+        task: of the bag.
+        found: what `evaluate_bag` said of it.
+    """
+    fibres, file = found["several"], task["fibres"]
+    if task["trials_of"] is not None:
+        taken = [name for name in fibres if name == task["trials_of"]]
+    elif file is not None:
+        taken = [name for name in fibres if name in file]
+    elif task["measured_only"]:
+        taken = fibres
+    else:
+        known = {path.stem for path in _all_fibre_files()}
+        taken = [name for name in fibres if name in known]
+    taken = taken or fibres  # each is refused by its name
+    others = [name for name in fibres if name not in taken]
+    line = left_out("', '".join(taken), others) if others else None
+    return [{**task, "fibre": name} for name in taken], line
 
 
 def evaluate_bag(task: Mapping[str, Any]) -> Found:
     """Read a bag, check it, and compare each model with it.
 
     Returns:
-        ``bag``; then either ``problem``: one line, or ``warnings``, ``trial`` (facts), ``measured`` and ``models``:
-        what `answer` says of each force, models with ``rmsd_f0`` as well; ``missing``: models without parameter set.
+        ``bag``; then ``several``: the fibres of a bag that has more than one, where the task does not choose; or
+        ``problem``: one line; or ``warnings``, ``trial`` (facts), ``measured`` and ``models``: what `answer` says of
+        each force, models with ``rmsd_f0`` as well; ``missing``: models without parameter set; ``notes``: lines on
+        facts that are not the bag's own.
     """
-    found: Found = {"bag": task["bag"]}
+    label = f"{task['bag']}, fibre {task['fibre']}" if "fibre" in task else task["bag"]
+    found: Found = {"bag": label}
     try:
-        trial = read_trial(Path(task["path"]))
+        bag = TrialBag(Path(task["path"]))
+        if len(bag.fibres) > 1 and "fibre" not in task:
+            return {**found, "several": bag.fibres}
+        trial, notes = _trial(bag, task)
+        facts = _facts(trial)
+        if CONDITIONING_FOUND in notes:
+            facts["amplitude_l0"], facts["recovery_s"] = nominal(facts["amplitude_l0"], facts["recovery_s"])
         check_trial(trial, task["bag"])
         found |= {
+            "notes": notes,
             "warnings": [line.replace(task["path"], task["bag"]) for line in trial.warnings],
-            "trial": {"path": task["path"], **_facts(trial)},
+            "trial": {"path": task["path"], **facts},
             "measured": answer(trial, trial.force_time_s, trial.measured_f0),
             "models": {},
             "missing": [],
@@ -94,7 +137,7 @@ def evaluate_bag(task: Mapping[str, Any]) -> Found:
                 found["models"][name] = _compared(trial, muscle, task["settle_s"])
     except UserError as error:
         text = str(error).replace(task["path"], task["bag"])
-        return {"bag": task["bag"], "problem": text if task["bag"] in text else f"bag {task['bag']}: {text}"}
+        return {"bag": label, "problem": text if task["bag"] in text else f"bag {task['bag']}: {text}"}
     return found
 
 
@@ -121,6 +164,7 @@ def enhancement_task(stretched: Found, isometric: Found, shared: Task) -> Task:
     states = [_file_state(Path(each["path"])) for each in (stretched, isometric)]
     return {
         **shared,
+        "fibre": stretched["fibre"],
         "stretched": stretched["path"],
         "isometric": isometric["path"],
         "state": states,
@@ -130,7 +174,7 @@ def enhancement_task(stretched: Found, isometric: Found, shared: Task) -> Task:
 
 def evaluate_enhancement(task: Mapping[str, Any]) -> Found:
     """Residual force enhancement of a pair of bags, measured and by each model; None where it cannot be had."""
-    stretched, isometric = read_trial(Path(task["stretched"])), read_trial(Path(task["isometric"]))
+    stretched, isometric = (_trial(TrialBag(Path(task[name])), task)[0] for name in ("stretched", "isometric"))
     end_s = _stretch(stretched)[1]
     # Clocks are set by the begin of activation, where calcium tells it.
     shift = _activated_s(isometric) - _activated_s(stretched)
@@ -155,6 +199,21 @@ def evaluate_enhancement(task: Mapping[str, Any]) -> Found:
             f0 = stretched.facts.f0_n, isometric.facts.f0_n
             found["models"][name] = compare(a.time_s, a.force_n / f0[0], b.time_s, b.force_n / f0[1])
     return found
+
+
+def _trial(bag: TrialBag, task: Mapping[str, Any]) -> tuple[Trial, tuple[str, ...]]:
+    """The trial of a task, complete, and lines on facts that are not the bag's own."""
+    fibre, only = task.get("fibre"), task["trials_of"]
+    alone = len(bag.fibres) == 1
+    name = bag.fibres[0] if fibre is None or alone else str(fibre)
+    told = (bag.named or name) if alone else name
+    if only is not None and only not in (name, told):
+        raise UserError(f"the bag's fibre is '{told}'; --trials-of takes those of '{only}' alone")
+    known = Known(**task["known"])
+    if not task["measured_only"]:
+        path = _fibre_path(task["fibres"], told)
+        known = known.of_file(_fibre(str(path), task["fibre_files"]))
+    return trial_of_bag(bag, name, known, task["bag"] if "bag" in task else str(bag.path))
 
 
 def _compared(trial: Trial, muscle: Muscle, settle_s: float | None) -> Found:
@@ -237,10 +296,15 @@ def _muscle(path: str, model: str, method: str | None, digest: str) -> Muscle | 
     return Muscle(load_fibre(path, model, method))
 
 
-@functools.lru_cache(maxsize=64)
 def _available(path: str, digest: str) -> tuple[str, ...]:
     """Sets of a fibre file; kept for as long as no fibre file changes."""
-    return load_fibre(path).available_models
+    return _fibre(path, digest).available_models
+
+
+@functools.lru_cache(maxsize=64)
+def _fibre(path: str, digest: str) -> Fibre:
+    """A fibre file with its own choice of model; kept for as long as no fibre file changes."""
+    return load_fibre(path)
 
 
 def _file_state(bag: Path) -> str:

@@ -5,80 +5,39 @@ from __future__ import annotations
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.completing import pca_of
 from xb_muscle_ros.trials.trial import Phase, Trial
 
-# Beyond these no fibre was measured; a record that goes there is in another unit.
-LENGTH_CHANGE_L0 = (-0.6, 1.0)
-FORCE_F0 = (-2.0, 10.0)
-CALCIUM_UM = 1e4
 _AMPLITUDE_L0 = 0.5
-_PCA_APART = 0.05
-# Above this pCa a fibre is relaxed, whatever stands for its calcium.
-_RELAXED_PCA = 8.0
 _PERCENT = 0.25
 _SHORTEST_COMPARED_S, _SMALLEST_COMPARED_L0 = 0.02, 0.01
 
 
 def check_trial(trial: Trial, where: str) -> None:
-    """Refuse a trial that cannot be evaluated.
+    """Refuse a trial that cannot be evaluated, though its values are those of a muscle (`trials.checks`).
 
     Args:
-        trial: as read.
+        trial: as read, complete.
         where: the bag, for messages.
 
     Raises:
-        UserError: no measured force, or none where the length has its stretches; length, force, calcium, amplitude or
-            recovery time in another unit than its topic or fact has; pCa missing or contrary to calcium.
+        UserError: no measured force, or none where the length has its stretches; amplitude or recovery time in another
+            unit than its fact has; pCa missing.
     """
-    facts = trial.facts
     if trial.force_time_s.size == 0:
         raise UserError(
             f"bag {where}: there is no measured force on /muscle/measured_force; evaluate compares with measurements"
         )
-    change = trial.length_change_l0
-    worst = float(change[np.argmax(np.abs(change))])
-    if not LENGTH_CHANGE_L0[0] <= worst <= LENGTH_CHANGE_L0[1]:
-        raise UserError(
-            f"bag {where}: length differs from L0 by {worst:.3g} L0; allowed is {LENGTH_CHANGE_L0[0]:g} to "
-            f"{LENGTH_CHANGE_L0[1]:g}: lengths are in m, one L0 is reference_length_m, {facts.reference_length_m:g}"
-        )
-    force = trial.measured_f0
-    worst = float(force[np.argmax(np.abs(force))])
-    if not FORCE_F0[0] <= worst <= FORCE_F0[1]:
-        raise UserError(
-            f"bag {where}: measured force goes to {worst:.3g} F0; allowed is {FORCE_F0[0]:g} to {FORCE_F0[1]:g}: "
-            f"forces are in N, one F0 is f0_n, {facts.f0_n:g}"
-        )
-    _check_calcium(trial, where)
+    _check_pca(trial, where)
     _check_protocol(trial, where)
     _check_cover(trial, where)
 
 
-def pca_of(trial: Trial) -> float | None:
-    """The pCa of a trial: as it says, or from calcium where that is constant; None where calcium changes."""
+def _check_pca(trial: Trial, where: str) -> None:
     calcium = trial.calcium_um
-    if trial.facts.pca is not None or np.ptp(calcium) > 0.0 or calcium[0] <= 0.0:
-        return trial.facts.pca
-    return float(6.0 - np.log10(calcium[0]))
-
-
-def _check_calcium(trial: Trial, where: str) -> None:
-    calcium, pca = trial.calcium_um, trial.facts.pca
-    if np.min(calcium) < 0.0 or np.max(calcium) > CALCIUM_UM:
-        worst = float(calcium[np.argmax(np.abs(calcium))])
-        raise UserError(f"bag {where}: calcium is {worst:.3g} µM; allowed is 0 to {CALCIUM_UM:g}: calcium is in µM")
-    if np.ptp(calcium) > 0.0:
-        return
-    if pca is None and calcium[0] <= 0.0:
+    if pca_of(trial) is None and np.ptp(calcium) == 0.0:
         raise UserError(
             f"bag {where}: pCa is missing: custom_data has no 'pca' and calcium is {calcium[0]:g} µM; add one of them"
-        )
-    if pca is None or (pca >= _RELAXED_PCA and calcium[0] <= 10.0 ** (6.0 - _RELAXED_PCA)):
-        return
-    if calcium[0] <= 0.0 or abs(6.0 - np.log10(calcium[0]) - pca) > _PCA_APART:
-        raise UserError(
-            f"bag {where}: pCa is {pca:g} but calcium is {calcium[0]:.4g} µM, where {10.0 ** (6.0 - pca):.4g} µM "
-            "belongs to it; calcium is in µM"
         )
 
 

@@ -21,10 +21,12 @@ from xb_muscle_ros.evaluate.srs_scores import ALL_READINGS, READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, read_table, read_tables
 from xb_muscle_ros.evaluate.tables_text import write_csv
 from xb_muscle_ros.evaluate.trials import Trials, duplicates, srs_table
-from xb_muscle_ros.files import write_text
+from xb_muscle_ros.files import matching, write_text
 from xb_muscle_ros.models.fibre_file import fibre_folders, find_fibre_file, load_fibre
 from xb_muscle_ros.scores.enhancement import AFTER_S
+from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.trials.bags import find_bags
+from xb_muscle_ros.trials.completing import Known, counted
 from xb_muscle_ros.work import Options, run, stream
 
 JOURNAL = "evaluate.journal"
@@ -48,6 +50,8 @@ class Request:
         golden: the authors' released output.
         out: folder for results; the journal lies there too.
         work: where to compute.
+        known: what is known of L0 and F0 beside bags and fibre files.
+        only: take trials of this fibre and no other.
     """
 
     bags: tuple[str, ...]
@@ -61,6 +65,8 @@ class Request:
     golden: Path | None
     out: Path
     work: Options
+    known: Known = field(default_factory=Known)
+    only: str | None = None
 
 
 @dataclass
@@ -106,8 +112,16 @@ def evaluate(request: Request, tell: Callable[[str], None] = lambda line: None) 
     return results
 
 
+def older_results(out: Path) -> list[Path]:
+    """What an older evaluation left in a folder; not its journal, which holds what is computed already."""
+    tables = ("trials", "force_rmsd", "relative_srs", "srs_cells", "srs_rmsd")
+    figures = ("force_rmsd", "relative_srs", "srs_surfaces")
+    return matching(out, r"evaluate\.(json|md)", rf"({'|'.join(tables)})\.csv", rf"({'|'.join(figures)})\.(png|pdf)")
+
+
 def write(request: Request, results: Results) -> list[Path]:
-    """Write all files of the results; returns what to look at."""
+    """Write all files of the results in the place of an older evaluation's; returns what to look at."""
+    remove_results(older_results(request.out))
     return [*write_tables(request.out, results), *draw_figures(request.out, results)]
 
 
@@ -163,11 +177,10 @@ def _recordings(request: Request, results: Results, tell: Callable[[str], None])
     found = find_bags(request.bags)
     files = _fibre_files(request.fibres)
     made = bag_tasks.tasks(
-        found, files, request.models, request.method, request.settle_s, measured_only=request.measured_only
-    )
-    trials = results.trials = Trials(len(made))
-    for index, one in stream(bag_tasks.evaluate_bag, made, _work(request, "recordings")):
-        trials.add(index, one)
+        found, files, request.models, request.method, request.settle_s, request.measured_only, request.known,
+        request.only,
+    )  # fmt: skip
+    trials = results.trials = _of_bags(request, results, made)
     _settle_problems(request, trials, tell)
     results.warnings += trials.warnings
     named = [name if files is None else files[name] for name in trials.fibres]
@@ -192,6 +205,33 @@ def _recordings(request: Request, results: Results, tell: Callable[[str], None])
             if table is not None:
                 results.tables[each.name] = table
         found_sections["srs"] = sections.srs_section(results.tables, data, results.models)
+
+
+def _of_bags(request: Request, results: Results, made: Sequence[Mapping[str, Any]]) -> Trials:
+    """What the bags' trials show; a bag of several fibres has as many."""
+    several: dict[int, list[dict[str, Any]]] = {}
+    done: dict[int, Mapping[str, Any]] = {}
+    lines: list[tuple[str, ...]] = []
+    for index, one in stream(bag_tasks.evaluate_bag, made, _work(request, "recordings")):
+        if "several" in one:
+            several[index], line = bag_tasks.tasks_of_fibres(made[index], one)
+            lines += [(line,)] if line is not None else []
+        else:
+            done[index] = one
+    # One trial after the other in the order of the bags, whichever was ready first.
+    places = [(index, k) for index in range(len(made)) for k in range(len(several.get(index, [0])))]
+    trials = Trials(len(places))
+    more = [(place, several[index][k]) for place, (index, k) in enumerate(places) if index in several]
+    for place, (index, _) in enumerate(places):
+        if index in done:
+            trials.add(place, done[index])
+            lines.append(tuple(done[index].get("notes", ())))
+    if more:
+        for i, one in stream(bag_tasks.evaluate_bag, [task for _, task in more], _work(request, "fibres")):
+            trials.add(more[i][0], one)
+            lines.append(tuple(one.get("notes", ())))
+    results.warnings += counted(lines)
+    return trials
 
 
 def _fibre_files(given: Sequence[str]) -> dict[str, Path] | None:

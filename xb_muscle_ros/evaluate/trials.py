@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable
-from xb_muscle_ros.scores.conditions import AMPLITUDES_L0, RECOVERIES_S
+from xb_muscle_ros.scores.conditions import AMPLITUDES_L0, CONDITIONS, RECOVERIES_S
 from xb_muscle_ros.trials.trial import Array
 
 WINDOWS = ("whole", "conditioning", "test")
@@ -58,7 +58,8 @@ class Trials:
         self._code[index] = self._codes.setdefault(facts["fibre"], len(self._codes))
         self.pca[index] = _number(facts["pca"])
         self.amplitude_l0[index] = _number(facts["amplitude_l0"])
-        self.recovery_s[index] = _number(facts["recovery_s"])
+        reference = facts["amplitude_l0"] == 0.0 and facts["recovery_s"] is None
+        self.recovery_s[index] = CONDITIONS[0].recovery_s if reference else _number(facts["recovery_s"])
         if facts["stretch_l0"] is not None or not facts["moves"]:
             # What residual force enhancement is looked for in; most trials are of another kind.
             self._shapes[index] = dict(facts)

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import write_text
-from xb_muscle_ros.prove.sealing import BENCHMARK, digest, load_benchmark
+from xb_muscle_ros.files import refuse_older, write_text
+from xb_muscle_ros.prove.sealing import BENCHMARK, digest, load_benchmark, older_cases
+from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.work import JsonValue, Options, stream
 
 VERSION = 2
@@ -26,7 +27,7 @@ def case_name(number: int) -> str:
     return f"case_{number:04d}"
 
 
-def make(out: Path, cases: int, seed: int, key: Path, method: str, options: Options) -> str:
+def make(out: Path, cases: int, seed: int, key: Path, method: str, options: Options, overwrite: bool = False) -> str:
     """Make a benchmark; a run that was stopped goes on where it was.
 
     Args:
@@ -36,6 +37,7 @@ def make(out: Path, cases: int, seed: int, key: Path, method: str, options: Opti
         key: file for the truths; must not lie in `out`.
         method: how the fibre files say that heads are distributed over strain.
         options: where to work; the journal is kept beside the key until all is done.
+        overwrite: replace another benchmark and its key.
 
     Returns:
         SHA-256 of the key file.
@@ -45,8 +47,10 @@ def make(out: Path, cases: int, seed: int, key: Path, method: str, options: Opti
     """
     if out.resolve() in key.resolve().parents:
         raise UserError(f"key {key} lies within {out}, where the tool would find it; choose a file elsewhere")
-    if (out / BENCHMARK).exists():
+    if (out / BENCHMARK).exists() and not overwrite:
         return _finished(out, cases, seed, key)
+    refuse_older([] if not key.exists() else [key], overwrite)
+    remove_results(older_cases(out))
     tasks = [_task(out, number, cases, seed, method) for number in range(1, cases + 1)]
     found: dict[int, Any] = dict(stream(_make_one, tasks, options))
     for index, task in enumerate(tasks):
@@ -76,7 +80,7 @@ def _finished(out: Path, cases: int, seed: int, key: Path) -> str:
     known = key.exists() and digest(key) == public["key_sha256"] and len(public["cases"]) == cases
     if known and json.loads(key.read_text(encoding="utf-8"))["seed"] == seed:
         return str(public["key_sha256"])
-    raise UserError(f"{out} holds another benchmark already; choose another folder or delete it")
+    raise UserError(f"{out} holds another benchmark already; use --overwrite to replace it or choose another folder")
 
 
 def _task(out: Path, number: int, cases: int, seed: int, method: str) -> dict[str, JsonValue]:

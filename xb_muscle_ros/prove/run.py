@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -11,15 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import write_text
+from xb_muscle_ros.files import matching, refuse_older, write_text
 from xb_muscle_ros.prove.sealing import BENCHMARK, load_benchmark
+from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.work import JsonValue, Options, stream
 
 RESULTS = "results.json"
 _JOURNAL = "run.journal"
 
 
-def run(folder: Path, out: Path, quick: bool, seed: int, options: Options) -> dict[str, Any]:
+def run(folder: Path, out: Path, quick: bool, seed: int, options: Options, overwrite: bool = False) -> dict[str, Any]:
     """Diagnose all cases; a run that was stopped goes on where it was.
 
     Args:
@@ -28,6 +30,7 @@ def run(folder: Path, out: Path, quick: bool, seed: int, options: Options) -> di
         quick: the tool's quick way.
         seed: of the tool.
         options: where to work.
+        overwrite: replace the results of an older run; diagnoses that the journal keeps are not done again.
 
     Returns:
         What ``results.json`` holds: by case, what the scoring needs of its diagnosis.
@@ -37,11 +40,24 @@ def run(folder: Path, out: Path, quick: bool, seed: int, options: Options) -> di
     """
     benchmark = load_benchmark(folder)
     tasks = [_task(folder, out, str(name), quick, seed) for name in benchmark["cases"]]
+    refuse_older(matching(out, re.escape(RESULTS)), overwrite)
     found = dict(stream(_diagnose, tasks, replace(options, journal=options.journal or out / _JOURNAL)))
     results = {"quick": quick, "seed": seed, "cases": {task["case"]: found[i] for i, task in enumerate(tasks)}}
+    remove_results(_stale(out, {str(name) for name in benchmark["cases"]}))
     write_text(out / RESULTS, json.dumps(results, indent=1) + "\n")
     write_text(out / BENCHMARK, json.dumps(benchmark, indent=1) + "\n")
     return results
+
+
+def _stale(out: Path, cases: set[str]) -> list[Path]:
+    """Diagnoses in a folder of results that are of cases of another benchmark."""
+    from xb_muscle_ros.diagnose.outcome import older_results
+
+    try:
+        older = {str(name) for name in load_benchmark(out)["cases"]}
+    except UserError:
+        return []
+    return [path for name in sorted(older - cases) for path in older_results(out / "cases" / name)]
 
 
 def _task(folder: Path, out: Path, name: str, quick: bool, seed: int) -> dict[str, Any]:

@@ -8,20 +8,22 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import write_text
+from xb_muscle_ros.files import matching, refuse_older, write_text
 from xb_muscle_ros.prove.counting import Score, by_size, calibration, scores
 from xb_muscle_ros.prove.judging import Judged, judge
 from xb_muscle_ros.prove.run import RESULTS
 from xb_muscle_ros.prove.sealing import load_benchmark, open_key
+from xb_muscle_ros.trials.bag_files import remove_results
 
 
-def score(results: Path, key: Path, out: Path) -> tuple[str, list[Path]]:
+def score(results: Path, key: Path, out: Path, overwrite: bool = False) -> tuple[str, list[Path]]:
     """Score the results of `prove run`.
 
     Args:
         results: folder with ``results.json`` and ``benchmark.json``.
         key: its hash must be the one of ``benchmark.json``.
         out: gets ``scores.json``, ``scores.md`` and figures.
+        overwrite: replace older scores.
 
     Returns:
         The table in words, and the files.
@@ -29,6 +31,7 @@ def score(results: Path, key: Path, out: Path) -> tuple[str, list[Path]]:
     Raises:
         UserError: a file is missing or is not what it should be, or the key is another one.
     """
+    refuse_older(_older(out), overwrite)
     benchmark = load_benchmark(results)
     truths = open_key(key, benchmark)["cases"]
     path = results / RESULTS
@@ -43,10 +46,15 @@ def score(results: Path, key: Path, out: Path) -> tuple[str, list[Path]]:
     return write(judged, str(benchmark["key_sha256"]), out)
 
 
+def _older(out: Path) -> list[Path]:
+    return matching(out, r"scores\.(json|md)", r"(confusion|inversion|by_size|calibration)\.(png|pdf)")
+
+
 def write(judged: Sequence[Judged], key_sha256: str, out: Path) -> tuple[str, list[Path]]:
     """Write scores, tables and figures of judged cases; see `score`."""
     from xb_muscle_ros.prove.score_figures import draw
 
+    remove_results(_older(out))
     found = scores(judged)
     tree = {
         "key_sha256": key_sha256,

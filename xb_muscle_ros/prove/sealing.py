@@ -4,12 +4,29 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.files import matching
 
 BENCHMARK = "benchmark.json"
+
+
+def older_cases(folder: Path) -> list[Path]:
+    """What an older benchmark left in a folder: the cases that it tells of, and itself last."""
+    try:
+        names = [str(name) for name in load_benchmark(folder)["cases"]]
+    except UserError:
+        names = []
+    found: list[Path] = []
+    for name in names:
+        case = folder / "cases" / name
+        if (case / "bags").is_dir():
+            found += [bag for bag in sorted((case / "bags").iterdir()) if bag.is_dir()]
+        found += matching(case, r"fibre\.yaml")
+    return [*found, *matching(folder, re.escape(BENCHMARK))]
 
 
 def digest(key: Path) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import write_text
+from xb_muscle_ros.files import refuse_older, write_text
 from xb_muscle_ros.prove.generator.case import Concealed, cells, conceal, size_class, trial_name
 from xb_muscle_ros.prove.generator.effects import EFFECTS
 from xb_muscle_ros.prove.generator.mix import Spec, spike_specs
@@ -22,7 +22,8 @@ from xb_muscle_ros.prove.generator.refit import Refit
 from xb_muscle_ros.prove.generator.study import Planned
 from xb_muscle_ros.prove.generator.world import MODELS, SAMPLE_S, World
 from xb_muscle_ros.prove.make import case_name, seal
-from xb_muscle_ros.prove.sealing import BENCHMARK
+from xb_muscle_ros.prove.sealing import BENCHMARK, older_cases
+from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.trials.bags import find_bags, read_trial, write_trial
 from xb_muscle_ros.trials.trial import Trial
 from xb_muscle_ros.work import JsonValue, Options, stream
@@ -33,7 +34,16 @@ _ABOUT = (
 )
 
 
-def spike(bags: Sequence[Path], fiber: Path, out: Path, cases: int, seed: int, key: Path, options: Options) -> str:
+def spike(
+    bags: Sequence[Path],
+    fiber: Path,
+    out: Path,
+    cases: int,
+    seed: int,
+    key: Path,
+    options: Options,
+    overwrite: bool = False,
+) -> str:
     """Make spike-ins of a recorded study; one case in five is left as it was recorded.
 
     Args:
@@ -44,6 +54,7 @@ def spike(bags: Sequence[Path], fiber: Path, out: Path, cases: int, seed: int, k
         seed: decides everything.
         key: file for the truths.
         options: where to work.
+        overwrite: replace another benchmark and its key.
 
     Returns:
         SHA-256 of the key.
@@ -53,8 +64,8 @@ def spike(bags: Sequence[Path], fiber: Path, out: Path, cases: int, seed: int, k
     """
     if out.resolve() in key.resolve().parents:
         raise UserError(f"key {key} lies within {out}, where the tool would find it; choose a file elsewhere")
-    if (out / BENCHMARK).exists():
-        raise UserError(f"{out} holds a benchmark already; choose another folder or delete it")
+    refuse_older([path for path in (out / BENCHMARK, key) if path.exists()], overwrite)
+    remove_results(older_cases(out))
     world = _world(fiber)
     paths = [str(path) for path in find_bags(bags)]
     specs = spike_specs(cases, seed, world.model)

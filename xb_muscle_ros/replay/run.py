@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.files import matching, refuse_older
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.offline import simulate_trial
 from xb_muscle_ros.replay.report import Record, add_relative_stiffness, record, table, write_json
+from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.simulated import Simulated
 from xb_muscle_ros.trials.trial import Trial
@@ -75,8 +78,39 @@ def replay(
     return Replay(fibre, live is not None, simulated, tuple(records), table(records, title))
 
 
+def older_results(folder: Path) -> list[Path]:
+    """What an older replay left in a folder: its table, its figures, and the bags that the table tells of."""
+    files = matching(folder, r"replay\.json", r"replay(_\d+)?\.(png|pdf)")
+    try:
+        rows = json.loads((folder / "replay.json").read_text(encoding="utf-8"))["trials"]
+        bags = [_bag(folder, str(row["trial"])) for row in rows]
+    except (OSError, ValueError, KeyError, TypeError):
+        bags = []
+    return [*files, *(bag for bag in bags if bag.is_dir())]
+
+
+def check_room(folder: Path, trials: Sequence[Trial], overwrite: bool) -> None:
+    """Make sure that results may be written to a folder.
+
+    Raises:
+        UserError: an older replay is there and may not be replaced, or a bag that is of none.
+    """
+    older = older_results(folder)
+    refuse_older(older, overwrite)
+    for trial in trials:
+        bag = _bag(folder, trial.facts.trial)
+        if bag.exists() and bag not in older:
+            raise UserError(f"bag {bag} exists and is of no replay; choose another folder for --out")
+
+
+def _bag(folder: Path, trial: str) -> Path:
+    return folder / "bags" / trial
+
+
 def write_results(folder: Path, trials: Sequence[Trial], results: Replay, live: Replay | None = None) -> list[Path]:
-    """Write ``replay.json``, the figure and one simulated bag per trial; returns what to look at.
+    """Write ``replay.json``, the figure and one simulated bag per trial in the place of an older replay's.
+
+    Returns what to look at.
 
     Args:
         folder: made if need be.
@@ -86,10 +120,11 @@ def write_results(folder: Path, trials: Sequence[Trial], results: Replay, live: 
     """
     from xb_muscle_ros.figures.replay_figure import draw_replay
 
+    remove_results(older_results(folder))
     facts = {"fibre": results.fibre.name, "model": results.fibre.model, "method": results.fibre.method}
     write_json(folder / "replay.json", results.records, {**facts, "live": results.live, "source": results.fibre.source})
     label = f"{results.fibre.model} ({'live' if results.live else 'offline'})"
     pages = draw_replay(folder / "replay.png", trials, results.simulated, label, live.simulated if live else None)
     for trial, simulated in zip(trials, results.simulated, strict=True):
-        write_trial(folder / "bags" / trial.facts.trial, trial, simulated)
+        write_trial(_bag(folder, trial.facts.trial), trial, simulated)
     return [folder / "replay.json", *pages]

@@ -61,3 +61,20 @@ def sets(large: str) -> dict[str, Mask]:
     """Masks of shape (classes, conditions) by the names in `SETS`, for a reading of ``large`` (see `LARGE`)."""
     mask = LARGE[large]
     return {"large": mask, "small": ~mask, "all": np.ones(SHAPE, dtype=bool)}
+
+
+def nominal(amplitude_l0: float | None, recovery_s: float | None) -> tuple[float | None, float | None]:
+    """Amplitude (L0) and recovery (s) that were found in a record, as the condition they are of.
+
+    Ramps are good to some 6 % of their amplitude, pauses to some 10 ms; shorter pauses are not seen. What is near none
+    of the paper's conditions is rounded, so that repeats are of one condition.
+    """
+    amplitude = None if amplitude_l0 is None else _near(amplitude_l0, (0.0, *AMPLITUDES_L0), 0.06, 3e-4)
+    recovery = None if recovery_s is None else _near(recovery_s, RECOVERIES_S, 0.05, 0.01)
+    return amplitude, recovery
+
+
+def _near(value: float, levels: tuple[float, ...], relative: float, absolute: float) -> float:
+    """The level that a value is near to, else the value to two digits."""
+    nearest = min(levels, key=lambda level: abs(level - value))
+    return nearest if abs(nearest - value) <= max(relative * nearest, absolute) else float(f"{value:.2g}")

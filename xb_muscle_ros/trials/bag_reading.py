@@ -1,67 +1,148 @@
-"""Reading trials and simulations from MCAP bags."""
+"""Reading trials and simulations from MCAP bags: what the bag says, and nothing that it does not."""
 
 from __future__ import annotations
 
-import dataclasses
-import struct
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
-from rosbags.serde import SerdeError
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
-from xb_muscle_ros.trials.bag_contents import BagContents, open_bag
+from xb_muscle_ros.trials.bag_contents import open_bag
+from xb_muscle_ros.trials.bag_topics import Samples, Topics
 from xb_muscle_ros.trials.custom_data import facts_from_custom_data
 from xb_muscle_ros.trials.ros_types import JointState
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
-from xb_muscle_ros.trials.trial import Array, Trial, TrialFacts
+from xb_muscle_ros.trials.trial import Trial, TrialFacts
+
+# Facts that belong to one fibre; a bag's other fibres have their own.
+_OF_THE_FIBRE = ("reference_length_m", "f0_n", "amplitude_l0", "recovery_s", "phases", "pca")
 
 
-class _Samples(NamedTuple):
-    time_s: Array
-    values: Array  # shape (n, fields)
-    name: str  # of the first joint
+class Reading(NamedTuple):
+    """A trial as its bag has it, and the names of the facts that the bag does not tell."""
+
+    trial: Trial
+    unknown: frozenset[str]
 
 
-def read_trial(path: Path) -> Trial:
-    """Read a trial.
-
-    A bag whose file was cut short, or that lost its ``metadata.yaml``, gives what can be read of it and one line in
-    ``Trial.warnings``. Times are the messages' header stamps in s.
+class TrialBag:
+    """A bag opened: every fibre whose length it has is a trial.
 
     Args:
         path: a bag folder or an ``.mcap`` file.
 
+    Attributes:
+        fibres: names on ``/muscle/length``, in the order in which they come.
+        named: the fibre that the bag's facts are of; None where they name none.
+
     Raises:
-        UserError: no bag, an empty one, one without ``/muscle/length`` or ``/muscle/calcium``, or one whose samples
-            are not finite, not in order of time, or not JointState messages.
+        UserError: no bag, an empty one, or one without lengths as JointState messages with names.
     """
-    bag = open_bag(Path(path))
-    length = _samples(bag, ros_types.LENGTH, ("position",))
-    calcium = _samples(bag, ros_types.CALCIUM, ("position",))
-    if ros_types.MEASURED_FORCE in bag.messages:
-        force = _samples(bag, ros_types.MEASURED_FORCE, ("effort",))
-    else:
-        force = _Samples(np.empty(0), np.empty((0, 1)), length.name)
-    name = bag.path.resolve()
-    facts = facts_from_custom_data(
-        bag.custom_data or {}, str(bag.path), length.name, name.stem if name.is_file() else name.name
-    )
-    if bag.custom_data is None:
-        facts = _guessed(facts, length.values[:, 0], calcium.values[:, 0])
-    return Trial(
-        facts=facts,
-        time_s=length.time_s,
-        length_m=length.values[:, 0],
-        calcium_time_s=calcium.time_s,
-        calcium_um=calcium.values[:, 0],
-        force_time_s=force.time_s,
-        force_n=force.values[:, 0],
-        warnings=_warnings(bag, facts, (length, calcium, force)),
-    )
+
+    def __init__(self, path: Path) -> None:
+        self.path = Path(path)
+        self._topics = Topics(open_bag(self.path))
+        self._data = self._topics.bag.custom_data or {}
+        self.fibres = self._topics.names(ros_types.LENGTH)
+        self.named: str | None = self._data.get("fibre")
+
+    def reading(self, fibre: str) -> Reading:
+        """The trial of one of the `fibres`. Times are the messages' header stamps in s.
+
+        Where no force was measured, one that a model made and a recorder got stands for it.
+
+        Raises:
+            UserError: no calcium for the fibre, or samples that are not finite or not in order of time.
+        """
+        topics, warnings = self._topics, list(self._state())
+        length = topics.samples(ros_types.LENGTH, ("position",), fibre)
+        calcium = self._of(ros_types.CALCIUM, "position", fibre)
+        if calcium is None:
+            raise UserError(
+                f"bag {self.path}: {ros_types.CALCIUM} names {_listed(topics.names(ros_types.CALCIUM))}, not fibre "
+                f"'{fibre}'; record the calcium of the fibre"
+            )
+        force, measured = self._of(ros_types.MEASURED_FORCE, "effort", fibre), True
+        if force is None and ros_types.FORCE in topics:
+            force, measured = self._of(ros_types.FORCE, "effort", fibre), False
+            if force is not None:
+                warnings.append(
+                    f"bag {self.path}: compared with the recorded {ros_types.FORCE}, which a model made; there is no "
+                    f"{ros_types.MEASURED_FORCE}"
+                )
+        facts, unknown = self._facts(fibre)
+        found = [each for each in (length, calcium, force) if each is not None]
+        warnings += [line for each in found for line in each.warnings]
+        names = sorted({each.name for each in found} - {facts.fibre})
+        if names:
+            warnings.append(f"bag {self.path}: messages name '{names[0]}', the trial facts name fibre '{facts.fibre}'")
+        none = Samples(np.empty(0), np.empty((0, 1)), fibre)
+        trial = Trial(
+            facts=facts,
+            time_s=length.time_s,
+            length_m=length.values[:, 0],
+            calcium_time_s=calcium.time_s,
+            calcium_um=calcium.values[:, 0],
+            force_time_s=(force or none).time_s,
+            force_n=(force or none).values[:, 0],
+            warnings=tuple(warnings),
+            force_is_measured=measured,
+        )
+        return Reading(trial, unknown)
+
+    def _of(self, topic: str, field: str, fibre: str) -> Samples | None:
+        """A fibre's samples on a topic; None where the topic is not there or is of others.
+
+        A topic whose one name is that of no fibre (a bath's calcium, a load cell) counts for every fibre.
+        """
+        if topic not in self._topics and topic != ros_types.CALCIUM:
+            return None
+        names = self._topics.names(topic)
+        if fibre in names:
+            return self._topics.samples(topic, (field,), fibre)
+        if len(names) == 1 and names[0] not in self.fibres:
+            return self._topics.samples(topic, (field,), names[0])
+        return None
+
+    def _facts(self, fibre: str) -> tuple[TrialFacts, frozenset[str]]:
+        """Facts of a fibre; those of another fibre of the bag are not its own."""
+        name = self.path.resolve()
+        trial = name.stem if name.is_file() else name.name
+        data = dict(self._data)
+        if len(self.fibres) > 1 and fibre != self.named:
+            if self.named is not None:
+                data = {key: value for key, value in data.items() if key not in _OF_THE_FIBRE}
+            data["fibre"] = fibre
+            data["trial"] = f"{data.get('trial', trial)}_{fibre.replace('/', '_')}"
+        facts = facts_from_custom_data(data, str(self.path), fibre, trial)
+        unknown = {key for key in _OF_THE_FIBRE if key not in data}
+        return facts, frozenset(unknown if facts.phases else {*unknown, "phases"})
+
+    def _state(self) -> tuple[str, ...]:
+        """At most one line on the state of the bag."""
+        bag = self._topics.bag
+        if not bag.flaws:
+            return ()
+        count = sum(len(messages) for messages in bag.messages.values())
+        lost = "; trial facts are lost" if bag.custom_data is None else ""
+        return (f"bag {bag.path}: {'; '.join(bag.flaws)}; {count} messages were read{lost}",)
+
+
+def read_trial(path: Path) -> Trial:
+    """Read the trial of a bag of one fibre; what the bag does not tell has the value of `TrialFacts`.
+
+    A bag whose file was cut short, or that lost its ``metadata.yaml``, gives what can be read of it and one line in
+    ``Trial.warnings``.
+
+    Raises:
+        UserError: see `TrialBag`; the bag is of several fibres.
+    """
+    bag = TrialBag(path)
+    if len(bag.fibres) > 1:
+        raise UserError(f"bag {bag.path} is of fibres {_listed(bag.fibres)}; give a bag of one")
+    return bag.reading(bag.fibres[0]).trial
 
 
 def read_simulated(path: Path) -> Simulated | None:
@@ -72,14 +153,15 @@ def read_simulated(path: Path) -> Simulated | None:
     Raises:
         UserError: as for `read_trial`, and a bag with force but without moments.
     """
-    bag = open_bag(Path(path))
-    if ros_types.FORCE not in bag.messages:
+    topics = Topics(open_bag(Path(path)))
+    if ros_types.FORCE not in topics:
         return None
-    force = _samples(bag, ros_types.FORCE, ("effort", "position", "velocity"))
-    moments = _moments(bag)
+    fibre = topics.names(ros_types.FORCE)[0]
+    force = topics.samples(ros_types.FORCE, ("effort", "position", "velocity"), fibre)
+    moments = topics.rows(ros_types.MOMENTS, lambda message, i: _moments(message, f"bag {path}", i))
     time_s, at_force, at_moments = np.intersect1d(force.time_s, moments.time_s, return_indices=True)
     if time_s.size == 0:
-        raise UserError(f"bag {bag.path}: {ros_types.FORCE} and {ros_types.MOMENTS} have no stamp in common")
+        raise UserError(f"bag {path}: {ros_types.FORCE} and {ros_types.MOMENTS} have no stamp in common")
     force_n, ce_length_m, ce_velocity = force.values[at_force].T
     return Simulated(
         time_s=time_s,
@@ -90,110 +172,13 @@ def read_simulated(path: Path) -> Simulated | None:
     )
 
 
-def _warnings(bag: BagContents, facts: TrialFacts, samples: tuple[_Samples, ...]) -> tuple[str, ...]:
-    """At most one line on the state of the bag, and one on names that do not fit."""
-    warnings = []
-    if bag.flaws:
-        count = sum(len(messages) for messages in bag.messages.values())
-        lost = ""
-        if bag.custom_data is None:
-            lost = f"; trial facts are lost, {facts.reference_length_m:g} m is taken for L0 and 1 N for F0"
-        warnings.append(f"bag {bag.path}: {'; '.join(bag.flaws)}; {count} messages were read{lost}")
-    names = sorted({each.name for each in samples} - {facts.fibre})
-    if names:
-        warnings.append(f"bag {bag.path}: messages name '{names[0]}', the trial facts name fibre '{facts.fibre}'")
-    return tuple(warnings)
+def _moments(message: JointState, where: str, i: int) -> list[float]:
+    held = {name.rpartition("/")[2]: value for name, value in zip(message.name, message.position, strict=False)}
+    missing = [name for name in MOMENTS if name not in held]
+    if missing:
+        raise UserError(f"{where}: {ros_types.MOMENTS}, message {i} has no {missing[0]}; needed: {', '.join(MOMENTS)}")
+    return [float(held[name]) for name in MOMENTS]
 
 
-def _guessed(facts: TrialFacts, length_m: Array, calcium_um: Array) -> TrialFacts:
-    """Facts for a bag that lost its own: pCa where calcium is constant, L0 as 1 m or else the first length."""
-    constant = calcium_um[0] > 0.0 and bool(np.all(calcium_um == calcium_um[0]))
-    return dataclasses.replace(
-        facts,
-        pca=float(6.0 - np.log10(calcium_um[0])) if constant else None,
-        reference_length_m=1.0 if 0.3 < length_m[0] < 3.0 or length_m[0] <= 0.0 else float(length_m[0]),
-    )
-
-
-def _samples(bag: BagContents, topic: str, fields: tuple[str, ...]) -> _Samples:
-    """Stamps and the first joint's values of a topic, checked."""
-    stamps, messages = _joint_states(bag, topic)
-    name = _first_name(bag, topic, 0, messages[0])
-    values = np.empty((len(messages), len(fields)))
-    for i, message in enumerate(messages):
-        if _first_name(bag, topic, i, message) != name:
-            raise UserError(
-                f"bag {bag.path}: {topic}, message {i} is of '{message.name[0]}', earlier ones of '{name}'; "
-                "allowed is one fibre to a bag"
-            )
-        for j, field in enumerate(fields):
-            array = getattr(message, field)
-            if len(array) == 0:
-                raise UserError(_at(bag, topic, i, stamps) + f"has an empty {field}; needed is one value for the fibre")
-            values[i, j] = array[0]
-    _check_finite(bag, topic, stamps, values)
-    return _Samples(ros_types.to_s(stamps), values, name)
-
-
-def _moments(bag: BagContents) -> _Samples:
-    stamps, messages = _joint_states(bag, ros_types.MOMENTS)
-    values = np.empty((len(messages), len(MOMENTS)))
-    for i, message in enumerate(messages):
-        held = {name.rpartition("/")[2]: value for name, value in zip(message.name, message.position, strict=False)}
-        missing = [name for name in MOMENTS if name not in held]
-        if missing:
-            raise UserError(
-                _at(bag, ros_types.MOMENTS, i, stamps) + f"has no {missing[0]}; needed: {', '.join(MOMENTS)}"
-            )
-        values[i] = [held[name] for name in MOMENTS]
-    _check_finite(bag, ros_types.MOMENTS, stamps, values)
-    return _Samples(ros_types.to_s(stamps), values, messages[0].name[0])
-
-
-def _joint_states(bag: BagContents, topic: str) -> tuple[npt.NDArray[np.int64], list[JointState]]:
-    """Messages of a topic and their strictly increasing header stamps in ns."""
-    if topic not in bag.messages:
-        flaws = f" ({'; '.join(bag.flaws)})" if bag.flaws else ""
-        raise UserError(
-            f"bag {bag.path} has no message on {topic}; topics there: {', '.join(sorted(bag.messages))}{flaws}; "
-            "record or remap the topic"
-        )
-    if bag.types[topic] != ros_types.JOINT_STATE or bag.encodings[topic] != "cdr":
-        raise UserError(
-            f"bag {bag.path}: {topic} is {bag.types[topic] or 'of no known type'} ({bag.encodings[topic]}); "
-            f"allowed is {ros_types.JOINT_STATE} (cdr)"
-        )
-    messages = []
-    for i, raw in enumerate(bag.messages[topic]):
-        try:
-            message = ros_types.typestore().deserialize_cdr(raw.data, ros_types.JOINT_STATE)
-        except (SerdeError, struct.error, ValueError, IndexError) as problem:
-            raise UserError(f"bag {bag.path}: {topic}, message {i} cannot be decoded: {problem}") from problem
-        assert isinstance(message, JointState)  # the type asked for
-        messages.append(message)
-    stamps = np.array([m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in messages], dtype=np.int64)
-    back = np.flatnonzero(np.diff(stamps) <= 0)
-    if back.size:
-        i = int(back[0]) + 1
-        raise UserError(
-            _at(bag, topic, i, stamps)
-            + f"does not come after the one before, t = {stamps[i - 1] / 1e9:.9f} s; header stamps have to increase"
-        )
-    return stamps, messages
-
-
-def _first_name(bag: BagContents, topic: str, i: int, message: JointState) -> str:
-    if not message.name:
-        raise UserError(f"bag {bag.path}: {topic}, message {i} has an empty name; needed is the fibre in name[0]")
-    return str(message.name[0])
-
-
-def _check_finite(bag: BagContents, topic: str, stamps: npt.NDArray[np.int64], values: Array) -> None:
-    bad = np.argwhere(~np.isfinite(values))
-    if bad.size:
-        i, j = (int(k) for k in bad[0])
-        raise UserError(_at(bag, topic, i, stamps) + f"has the value {values[i, j]}; allowed are finite numbers")
-
-
-def _at(bag: BagContents, topic: str, i: int, stamps: npt.NDArray[np.int64]) -> str:
-    return f"bag {bag.path}: {topic}, message {i} at t = {stamps[i] / 1e9:.9f} s "
+def _listed(names: list[str]) -> str:
+    return ", ".join(f"'{name}'" for name in names)

@@ -96,7 +96,7 @@ def _series(trial: Trial, simulated: Simulated | None, where: str) -> list[_Seri
     ]
     series = []
     for topic, time_s, values in inputs:
-        if topic != ros_types.MEASURED_FORCE or time_s.size:
+        if topic != ros_types.MEASURED_FORCE or (time_s.size and trial.force_is_measured):
             series.append(
                 _Series(topic, _stamps(time_s, (values,), topic, where), _one_value(topic, time_s, values, fibre))
             )

@@ -10,7 +10,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from xb_muscle_ros.trials.runs import LASTING_SAMPLES, Run, merge, split, with_steps, without_departure, without_give
+from xb_muscle_ros.trials.runs import (
+    LASTING_SAMPLES,
+    Run,
+    lasting_samples,
+    merge,
+    samples_of,
+    split,
+    with_steps,
+    without_departure,
+    without_give,
+)
 from xb_muscle_ros.trials.trial import Array
 
 # A slope belongs to a ramp above this fraction of the fastest slope, so that halves of rounded corners are split.
@@ -18,14 +28,20 @@ RAMP_FRACTION = 0.3
 # The slope's noise (standard deviation) has to be this much smaller than the fastest slope.
 NOISE_FRACTION = 0.08
 # Half-windows of the slope estimate, samples; the smallest quiet enough is used, so that short ramps stay visible.
-HALF_WINDOWS = (1, 2, 3, 4, 6, 8, 12, 16, 24)
+# Long ones, beyond this in s, are for finer samples alone: they would blur a ramp of the paper's.
+HALF_WINDOWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 36, 54, 80, 120, 180, 240)
+LONGEST_HALF_WINDOW_S, ALWAYS_TRIED = 0.024, 24
 # Ramps below these are wobble: relative to the largest ramp, and to the length itself.
 SMALLEST_RAMP = 0.01
 SMALLEST_STRAIN = 3e-4
 # Beside much faster ramps, a slow one is looked for where a level ends this much (L0) off its begin.
 SLOW_STRAIN = 5e-3
-# A pause of fewer samples cannot be told from a rounded corner: filters and motors round over some 12 ms at 1 kHz.
-SHORTEST_PAUSE = 9
+# A shorter pause cannot be told from a rounded corner: filters and motors round over some 12 ms. Samples, at 1 kHz and
+# above; what is sampled more coarsely is not smoothed that much, but a pause has a few samples all the same.
+SHORTEST_PAUSE, FEWEST_IN_PAUSE = 9, 3
+SHORTEST_PAUSE_S = 9e-3
+# Half of a record may be ramps and their corners, which are no noise: this quantile of the slope's changes is.
+QUIET_QUANTILE, QUIET_FACTOR = 0.25, 3.138
 # A ramp of few samples begins and ends where it is this near its levels, as part of its rise.
 STEP_EDGE = 0.05
 # A level next to a corner is taken from at most this many samples, so that slow drift further away does not count.
@@ -63,9 +79,9 @@ def straight_pieces(time_s: Array, length: Array, l0: float | None = None, servo
     """
     l0 = float(np.median(length)) if l0 is None else l0
     slope, half_window = _quiet_slope(time_s, length)
-    runs = _ramp_runs(length, slope, half_window)
+    runs = _ramp_runs(time_s, length, slope, half_window)
     runs = merge([part for run in runs for part in _slower_ramps(run, time_s, length, l0)])
-    runs = without_give(without_departure(runs), length, servo_give)
+    runs = without_give(without_departure(runs, lasting_samples(time_s)), length, servo_give)
     runs = with_steps(runs, time_s, length, l0)
     lines = [_line(time_s, length, run, half_window) for run in runs]
     corners = [float(time_s[0])]
@@ -84,22 +100,24 @@ def straight_pieces(time_s: Array, length: Array, l0: float | None = None, servo
 
 def _quiet_slope(time_s: Array, length: Array) -> tuple[Array, int]:
     """Slope of the length over the smallest window that keeps its noise down; zero where no window does."""
+    step_s = float(np.median(np.diff(time_s))) if time_s.size > 1 else 0.0
     for half_window in HALF_WINDOWS:
-        if time_s.size < 4 * half_window + 3:
+        too_long = half_window > ALWAYS_TRIED and half_window * step_s > LONGEST_HALF_WINDOW_S
+        if time_s.size < 4 * half_window + 3 or too_long:
             break
         slope = _slope(time_s, length, half_window)
-        fastest = _fastest(slope)
+        fastest = _fastest(slope, lasting_samples(time_s))
         apart = slope[2 * half_window + 1 :] - slope[: -(2 * half_window + 1)]
-        noise = 1.4826 * float(np.median(np.abs(apart))) / np.sqrt(2.0)
+        noise = QUIET_FACTOR * float(np.quantile(np.abs(apart), QUIET_QUANTILE)) / np.sqrt(2.0)
         # A step within a few samples lasts only as long as the window.
         if fastest > 0.0 and noise <= NOISE_FRACTION * fastest:
             return slope, half_window
     return np.zeros_like(length), 1
 
 
-def _fastest(slope: Array) -> float:
+def _fastest(slope: Array, lasting: int) -> float:
     """The fastest slope that lasts: a glitch of one sample is faster than any ramp."""
-    windows = np.lib.stride_tricks.sliding_window_view(slope, min(LASTING_SAMPLES, slope.size))
+    windows = np.lib.stride_tricks.sliding_window_view(slope, min(lasting, slope.size))
     return float(max(np.max(np.min(windows, axis=1)), -np.min(np.max(windows, axis=1)), 0.0))
 
 
@@ -118,15 +136,15 @@ def _slope(time_s: Array, length: Array, half_window: int) -> Array:
     return np.pad(inner, half_window, mode="edge")
 
 
-def _ramp_runs(length: Array, slope: Array, half_window: int) -> list[Run]:
+def _ramp_runs(time_s: Array, length: Array, slope: Array, half_window: int) -> list[Run]:
     """Runs of samples with one direction; wobble and pauses shorter than the slope's window are not runs."""
-    fastest = _fastest(slope)
+    fastest = _fastest(slope, lasting_samples(time_s))
     moving = np.abs(slope) > RAMP_FRACTION * fastest if fastest > 0.0 else np.zeros(slope.size, dtype=bool)
     runs = split((np.sign(slope) * moving).astype(np.int64))
     rise = [abs(float(length[run.last] - length[run.first])) if run.direction else 0.0 for run in runs]
     smallest = max(SMALLEST_RAMP * max(rise), SMALLEST_STRAIN * abs(float(np.median(length))))
     runs = merge([run if up >= smallest else run._replace(direction=0) for run, up in zip(runs, rise, strict=True)])
-    shortest_pause = max(SHORTEST_PAUSE, 2 * half_window + 1)
+    shortest_pause = max(samples_of(SHORTEST_PAUSE_S, time_s, FEWEST_IN_PAUSE, SHORTEST_PAUSE), 2 * half_window + 1)
     # The samples of shorter pauses belong to no piece: neither line is fitted to them.
     seen = [run for run in runs if run.direction or run.samples >= shortest_pause]
     return [_sharpened(run, length, half_window) for run in merge(seen or runs)]
@@ -158,7 +176,7 @@ def _slower_ramps(run: Run, time_s: Array, length: Array, l0: float) -> list[Run
     if abs(float(np.median(part[-edge:]) - np.median(part[:edge]))) < SLOW_STRAIN * l0:
         return [run]
     slope, half_window = _quiet_slope(time_s[run.first : run.last + 1], part)
-    found = _ramp_runs(part, slope, half_window)
+    found = _ramp_runs(time_s[run.first : run.last + 1], part, slope, half_window)
     found[0], found[-1] = found[0]._replace(first=0), found[-1]._replace(last=part.size - 1)
     return [Run(each.direction, run.first + each.first, run.first + each.last) for each in found]
 

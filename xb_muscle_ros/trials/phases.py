@@ -66,6 +66,29 @@ def detect_phases(
     return tuple(Phase(name, piece.start_s, piece.end_s) for name, piece in zip(names, pieces, strict=True))
 
 
+def conditioning(
+    time_s: Array, length_m: Array, l0: float, phases: tuple[Phase, ...]
+) -> tuple[float | None, float | None]:
+    """Amplitude of the conditioning stretch (L0; 0 for a reference trial) and recovery (s) as phases show them.
+
+    Args:
+        time_s, length_m: shape (n,), the record; s, m.
+        l0: the length that is L0, m.
+        phases: of the record.
+
+    Returns:
+        None for what is not plain: both where the trial is no paper's protocol, recovery of a reference trial.
+    """
+    found = {phase.name: phase for phase in phases}
+    if "test_stretch" not in found:
+        return None, None
+    if "conditioning_stretch" not in found:
+        return 0.0, None
+    stretch, rest = found["conditioning_stretch"], found.get("recovery")
+    start_m, end_m = np.interp([stretch.start_s, stretch.end_s], time_s, length_m)
+    return round(float(end_m - start_m) / l0, 4), round(rest.end_s - rest.start_s, 4) if rest else 0.0
+
+
 def initial_isometric(time_s: Array, phases: tuple[Phase, ...]) -> slice:
     """Samples of the isometric phase that begins a trial, without its last fifth (smoothing leaks the stretch into it).
 

@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from xb_muscle_ros.trials.trial import Array
 
-# A ramp has to last this many samples.
-LASTING_SAMPLES = 6
+# A ramp has to last this many samples at 1 kHz and above, and fewer where samples are further apart.
+LASTING_SAMPLES, FEWEST_IN_RAMP = 6, 3
+LASTING_S = 6e-3
 # Levels before and after a give differ by less than this fraction of the largest give.
 SAME_LEVEL = 0.25
 # A quick release lasts no longer (s) and is no slower (L0/s): faster than a fibre follows, short against a ramp.
@@ -40,6 +41,17 @@ class Run(NamedTuple):
         return self.last - self.first + 1
 
 
+def samples_of(duration_s: float, time_s: Array, least: int, most: int) -> int:
+    """How many samples a duration has, within bounds; by the median step."""
+    step_s = float(np.median(np.diff(time_s))) if time_s.size > 1 else duration_s
+    return int(np.clip(np.ceil(duration_s / step_s - 1e-9), least, most))
+
+
+def lasting_samples(time_s: Array) -> int:
+    """How many samples a ramp has to last."""
+    return samples_of(LASTING_S, time_s, FEWEST_IN_RAMP, LASTING_SAMPLES)
+
+
 def split(directions: npt.NDArray[np.int64]) -> list[Run]:
     """Runs of equal directions."""
     edges = [0, *(np.flatnonzero(np.diff(directions)) + 1).tolist(), directions.size]
@@ -57,9 +69,9 @@ def merge(runs: Sequence[Run]) -> list[Run]:
     return merged
 
 
-def without_departure(runs: list[Run]) -> list[Run]:
+def without_departure(runs: list[Run], lasting: int) -> list[Run]:
     """Runs without a ramp that the end of the record cuts off at its begin; its samples go to the run before."""
-    if len(runs) > 1 and runs[-1].direction != 0 and runs[-1].samples < LASTING_SAMPLES:
+    if len(runs) > 1 and runs[-1].direction != 0 and runs[-1].samples < lasting:
         return [*runs[:-2], runs[-2]._replace(last=runs[-1].last)]
     return runs
 

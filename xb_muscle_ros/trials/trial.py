@@ -70,6 +70,7 @@ class Trial:
         force_time_s: shape (k,), strictly increasing, s; empty where force was not measured.
         force_n: shape (k,), measured force, N.
         warnings: what was wrong with the source but could be lived with (a recovered file, say), one line each.
+        force_is_measured: False where a model made the force that stands for the measured one.
     """
 
     facts: TrialFacts
@@ -80,6 +81,7 @@ class Trial:
     force_time_s: Array = field(default_factory=lambda: np.empty(0))
     force_n: Array = field(default_factory=lambda: np.empty(0))
     warnings: tuple[str, ...] = ()
+    force_is_measured: bool = True
 
     def __post_init__(self) -> None:
         for name in ("time_s", "length_m", "calcium_time_s", "calcium_um", "force_time_s", "force_n"):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from datetime import datetime, timezone
 from functools import partial
@@ -20,7 +20,10 @@ import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
-from xb_muscle_ros.trials.bag_files import METADATA
+from xb_muscle_ros.trials.bag_contents import open_bag
+from xb_muscle_ros.trials.bag_files import METADATA, is_bag
+from xb_muscle_ros.trials.bag_messages import AnyMessage, decoded
+from xb_muscle_ros.trials.mcap_records import MAGIC
 from xb_muscle_ros.trials.readers.base import Pending
 from xb_muscle_ros.trials.readers.columns import BAG
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping
@@ -55,9 +58,9 @@ class BagReader:
     }
 
     def matches(self, path: Path) -> bool:
-        """Whether it is a folder with a bag's metadata, or a file that begins or is called like a bag's."""
+        """Whether it is a folder that is a bag and holds nothing else, or a file that begins or is called like one."""
         if path.is_dir():
-            return (path / METADATA).is_file()
+            return is_bag(path) and ((path / METADATA).is_file() or all(_is_mcap(file) for file in path.iterdir()))
         if path.suffix.lower() in self.suffixes:
             return True
         if not path.is_file():
@@ -83,15 +86,15 @@ def _recording(path: Path, mapping: ImportMapping) -> Recording:
         "stimulation": None if mapping.stimulation is None else mapping.stimulation.column,
     }
     wanted = {key: column for key, column in columns.items() if column is not None}
-    series = _read(path, wanted, mapping.time.name)
+    series, flaws = _read(path, wanted, mapping.time.name)
     first_ns = int(series["length"].stamps_ns[0])
     signals = {key: _signal(wanted[key], one, first_ns, key) for key, one in series.items()}
     length = signals["length"]
     assert length.times is not None  # every signal of a bag has its own
     late = {key: one.values.size - signals[key].values.size for key, one in series.items()}
-    warnings: tuple[str, ...] = ()
+    warnings = flaws
     if late.get("force"):
-        warnings = (
+        warnings += (
             f"bag {path}: {late['force']} messages on {wanted['force'].name} come before the first length; "
             "they are left out",
         )
@@ -125,39 +128,66 @@ def _message(first: int, i: int) -> str:
     return f"message {first + i}"
 
 
-def _read(path: Path, wanted: dict[str, Column], stamp: str) -> dict[str, _Series]:
-    """Stamps and values of the wanted signals, messages one by one."""
-    from rosbags.highlevel import AnyReader
-
+def _read(path: Path, wanted: dict[str, Column], stamp: str) -> tuple[dict[str, _Series], tuple[str, ...]]:
+    """Stamps and values of the wanted signals, messages one by one, and what is wrong with the bag."""
     steps = {key: _steps(column, path) for key, column in wanted.items()}
     stamps = {key: array("q") for key in wanted}
     values = {key: array("d") for key in wanted}
+    messages, flaws = _messages(path, list(wanted.values()))
+    for topic, log_ns, message in messages:
+        for key, column in wanted.items():
+            if column.name == topic:
+                where = f"bag {path}, {column.name}, message {len(values[key])}"
+                stamps[key].append(log_ns if stamp == "log" else _header_ns(message, where))
+                values[key].append(_value(message, steps[key], f"{where}, {column.field}"))
+    for key, column in wanted.items():
+        if not values[key]:
+            raise UserError(f"bag {path} has no message on {column.name}; record the topic")
+    return {key: _Series(np.array(stamps[key], dtype=np.int64), np.array(values[key])) for key in wanted}, flaws
+
+
+def _messages(path: Path, wanted: list[Column]) -> tuple[Iterator[AnyMessage], tuple[str, ...]]:
+    """Messages of the wanted topics, and what is wrong with the bag and was lived with."""
+    topics = {column.name for column in wanted}
+    if (path.is_file() and not _is_mcap(path)) or (path.is_dir() and not any(map(_is_mcap, path.iterdir()))):
+        return _by_library(path, wanted), ()
+    bag = open_bag(path, topics)
+    _check_topics(path, wanted, bag.types)
+    flaws = (f"bag {path}: {'; '.join(bag.flaws)}; what is whole was read",) if bag.flaws else ()
+    return decoded(bag), flaws
+
+
+def _by_library(path: Path, wanted: list[Column]) -> Iterator[AnyMessage]:
+    """Messages of a bag that is stored as SQLite."""
+    from rosbags.highlevel import AnyReader
+
     try:
         with AnyReader([path], default_typestore=ros_types.typestore()) as reader:
-            by_topic = {connection.topic: connection for connection in reader.connections}
-            for column in wanted.values():
-                if column.name not in by_topic:
-                    raise UserError(
-                        f"bag {path} has no topic {column.name}; its topics: {', '.join(sorted(by_topic))}; name the "
-                        "topic in columns of the mapping"
-                    )
-            topics = {column.name for column in wanted.values()}
+            _check_topics(path, wanted, [connection.topic for connection in reader.connections])
+            topics = {column.name for column in wanted}
             used = [connection for connection in reader.connections if connection.topic in topics]
             for connection, log_ns, data in reader.messages(connections=used):
-                message = reader.deserialize(data, connection.msgtype)
-                for key, column in wanted.items():
-                    if column.name == connection.topic:
-                        where = f"bag {path}, {column.name}, message {len(values[key])}"
-                        stamps[key].append(log_ns if stamp == "log" else _header_ns(message, where))
-                        values[key].append(_value(message, steps[key], f"{where}, {column.field}"))
+                yield AnyMessage(connection.topic, log_ns, reader.deserialize(data, connection.msgtype))
     except UserError:
         raise
     except Exception as problem:  # the library passes on what its parsers trip over
         raise UserError(f"bag {path} cannot be read: {problem}; record or convert it again") from problem
-    for key, column in wanted.items():
-        if not values[key]:
-            raise UserError(f"bag {path} has no message on {column.name}; record the topic")
-    return {key: _Series(np.array(stamps[key], dtype=np.int64), np.array(values[key])) for key in wanted}
+
+
+def _check_topics(path: Path, wanted: list[Column], topics: Iterable[str]) -> None:
+    for column in wanted:
+        if column.name not in topics:
+            raise UserError(
+                f"bag {path} has no topic {column.name}; its topics: {', '.join(sorted(topics))}; name the "
+                "topic in columns of the mapping"
+            )
+
+
+def _is_mcap(path: Path) -> bool:
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(len(MAGIC)) == MAGIC
 
 
 def _header_ns(message: Any, where: str) -> int:

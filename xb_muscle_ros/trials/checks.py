@@ -1,0 +1,125 @@
+"""Are the values of a trial those of a muscle? Each fault is one line that names the bag, the value and the remedy."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.trial import Array, Trial
+
+# Beyond these no fibre was measured; a record that goes there is in another unit.
+LENGTH_CHANGE_L0 = (-0.6, 1.0)
+FORCE_F0 = (-2.0, 10.0)
+CALCIUM_UM = 1e4
+# Beyond these it is worth a line: short-range stiffness, overlap and passive tension are known within.
+USUAL_LENGTH_L0 = (0.5, 1.5)
+USUAL_PEAK_F0 = 3.0
+LEAST_PEAK_F0 = 3e-3
+# At this free calcium a fibre is active, µM (pCa 6.3).
+ACTIVE_UM = 0.5
+_PCA_APART = 0.05
+# Above this pCa a fibre is relaxed, whatever stands for its calcium.
+_RELAXED_PCA = 8.0
+# A gap is this much longer than the median step, and than this, s.
+_GAP_STEPS, _GAP_S = 5.0, 0.01
+# What length changes by across a gap that can be lived with, L0.
+_ACROSS_L0 = 5e-3
+
+
+def check_values(trial: Trial, where: str, f0_is_told: bool = True) -> tuple[str, ...]:
+    """Refuse a trial whose values make no sense; say what is unusual.
+
+    Args:
+        trial: with all facts.
+        where: the bag, for messages.
+        f0_is_told: whether bag, fibre file or user tell F0; else 1 N is taken for it.
+
+    Returns:
+        Lines on lengths and forces that are far from L0 and F0, and on gaps.
+
+    Raises:
+        UserError: length, force or calcium are in another unit than their topic or fact has, pCa is contrary to
+            calcium, or samples are missing while length changes.
+    """
+    _check_calcium(trial, where)
+    return (*_length(trial, where), *_force(trial, where, f0_is_told), *_gaps(trial, where))
+
+
+def _length(trial: Trial, where: str) -> tuple[str, ...]:
+    change = trial.length_change_l0
+    worst = float(change[np.argmax(np.abs(change))])
+    reference = f"one L0 is {trial.facts.reference_length_m:g} m (reference_length_m); --reference-length gives another"
+    if not LENGTH_CHANGE_L0[0] <= worst <= LENGTH_CHANGE_L0[1]:
+        raise UserError(
+            f"bag {where}: length differs from L0 by {worst:.3g} L0; allowed is {LENGTH_CHANGE_L0[0]:g} to "
+            f"{LENGTH_CHANGE_L0[1]:g}: lengths are in m, {reference}"
+        )
+    if USUAL_LENGTH_L0[0] <= 1.0 + worst <= USUAL_LENGTH_L0[1]:
+        return ()
+    return (f"bag {where}: length goes to {1.0 + worst:.3g} L0, far from L0: {reference}",)
+
+
+def _force(trial: Trial, where: str, f0_is_told: bool) -> tuple[str, ...]:
+    force = trial.measured_f0
+    if force.size == 0:
+        return ()
+    worst = float(force[np.argmax(np.abs(force))])
+    unit = f"forces are in N, one F0 is {trial.facts.f0_n:g} N (f0_n); --f0 gives another"
+    if not FORCE_F0[0] <= worst <= FORCE_F0[1]:
+        raise UserError(
+            f"bag {where}: measured force goes to {worst:.3g} F0; allowed is {FORCE_F0[0]:g} to {FORCE_F0[1]:g}: {unit}"
+        )
+    active = float(np.max(trial.calcium_um)) >= ACTIVE_UM
+    if abs(worst) <= USUAL_PEAK_F0 and not (active and abs(worst) < LEAST_PEAK_F0):
+        return ()
+    line = f"bag {where}: measured force goes to {worst:.3g} F0, far from F0: {unit}"
+    if not f0_is_told:
+        raise UserError(f"{line}, and nothing tells what F0 is")
+    return (line,)
+
+
+def _check_calcium(trial: Trial, where: str) -> None:
+    calcium, pca = trial.calcium_um, trial.facts.pca
+    if np.min(calcium) < 0.0 or np.max(calcium) > CALCIUM_UM:
+        worst = float(calcium[np.argmax(np.abs(calcium))])
+        raise UserError(f"bag {where}: calcium is {worst:.3g} µM; allowed is 0 to {CALCIUM_UM:g}: calcium is in µM")
+    if np.ptp(calcium) > 0.0 or pca is None:
+        return
+    if pca >= _RELAXED_PCA and calcium[0] <= 10.0 ** (6.0 - _RELAXED_PCA):
+        return
+    if calcium[0] <= 0.0 or abs(6.0 - np.log10(calcium[0]) - pca) > _PCA_APART:
+        raise UserError(
+            f"bag {where}: pCa is {pca:g} but calcium is {calcium[0]:.4g} µM, where {10.0 ** (6.0 - pca):.4g} µM "
+            "belongs to it; calcium is in µM"
+        )
+
+
+def _gaps(trial: Trial, where: str) -> tuple[str, ...]:
+    lines = []
+    for what, time_s in (("length", trial.time_s), ("measured force", trial.force_time_s)):
+        gap = _largest_gap(time_s)
+        if gap is None:
+            continue
+        start_s, end_s, usual_s = gap
+        line = (
+            f"bag {where}: {what} has no sample for {end_s - start_s:.3g} s after t = {start_s:.6g} s, where samples "
+            f"are {usual_s:.3g} s apart"
+        )
+        before, after = np.interp([start_s, end_s], trial.time_s, trial.length_change_l0)
+        if what == "length" and abs(after - before) > _ACROSS_L0:
+            raise UserError(
+                f"{line}, and changes by {after - before:.3g} L0 within; record it again or cut the trial there"
+            )
+        lines.append(f"{line}; {'a straight line is taken' if what == 'length' else 'nothing is compared there'}")
+    return tuple(lines)
+
+
+def _largest_gap(time_s: Array) -> tuple[float, float, float] | None:
+    """Begin and end of the largest gap and the median step, s; None where there is no gap to speak of."""
+    steps = np.diff(time_s)
+    if steps.size < 2:
+        return None
+    usual, i = float(np.median(steps)), int(np.argmax(steps))
+    if steps[i] <= max(_GAP_STEPS * usual, _GAP_S):
+        return None
+    return float(time_s[i]), float(time_s[i + 1]), usual

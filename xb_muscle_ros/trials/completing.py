@@ -1,0 +1,157 @@
+"""What a bag does not tell of a trial: taken from the command line, the fibre file, or the samples, and said."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from xb_muscle_ros.trials.bag_reading import Reading
+from xb_muscle_ros.trials.phases import conditioning, detect_phases, initial_isometric
+from xb_muscle_ros.trials.trial import Array, Trial
+
+# Digits of a pCa that is taken from calcium: 10^(6 - pCa) does not come back to the last bit.
+_PCA_DIGITS = 6
+CONDITIONING_FOUND = "amplitude and recovery found from length"
+_PHASES = "phases found from length"
+# A record moves where means of so many parts differ by this share of length, and by so many of their standard errors.
+_PARTS, _LEAST_MOVE, _ERRORS = 20, 3e-3, 8.0
+
+
+class FibreConstants(Protocol):
+    """What is needed of a fibre file: its `Fibre` has it."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def path(self) -> Path | None: ...
+    @property
+    def reference_length_m(self) -> float: ...
+    @property
+    def f0_n(self) -> float: ...
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a fibre beside its bags.
+
+    Attributes:
+        reference_length_m: the user's L0, m; goes before that of a bag.
+        first_isometric: the user wants the length before the first stretch for L0.
+        f0_n: the user's F0, N; goes before that of a bag.
+        file_reference_length_m, file_f0_n: of the fibre file; taken where a bag has none.
+        file: name of the fibre file; empty without one.
+    """
+
+    reference_length_m: float | None = None
+    first_isometric: bool = False
+    f0_n: float | None = None
+    file_reference_length_m: float = 1.0
+    file_f0_n: float = 1.0
+    file: str = ""
+
+    def of_file(self, fibre: FibreConstants) -> Known:
+        """The same with L0 and F0 of a fibre file."""
+        return replace(
+            self,
+            file_reference_length_m=fibre.reference_length_m,
+            file_f0_n=fibre.f0_n,
+            file=fibre.name if fibre.path is None else fibre.path.name,
+        )
+
+
+def complete(reading: Reading, known: Known) -> tuple[Trial, tuple[str, ...]]:
+    """The trial with all facts, and a line for each kind of fact that is not the bag's own.
+
+    L0 and F0 are the user's, else the bag's, else the fibre file's (1 m and 1 N, as for normalised data, where it says
+    nothing else). Phases are found from length, amplitude and recovery from phases that are the paper's protocol, and
+    pCa from calcium that is constant.
+    """
+    trial, unknown = reading
+    notes: list[str] = []
+    if "phases" in unknown:
+        trial = _with_phases(trial, _length_for_phases(trial, unknown, known))
+        hidden = [phase.name for phase in trial.facts.phases] == ["isometric"] and _moves(trial.length_m)
+        notes.append("no phases found, though length moves: its noise hides them" if hidden else _PHASES)
+    trial, told = _with_scales(trial, unknown, known)
+    notes += told
+    facts = trial.facts
+    amplitude, recovery = conditioning(trial.time_s, trial.length_m, facts.reference_length_m, facts.phases)
+    found = replace(
+        facts,
+        amplitude_l0=amplitude if facts.amplitude_l0 is None else facts.amplitude_l0,
+        recovery_s=recovery if facts.recovery_s is None else facts.recovery_s,
+        pca=pca_of(trial),
+    )
+    if (found.amplitude_l0, found.recovery_s) != (facts.amplitude_l0, facts.recovery_s):
+        notes.append(CONDITIONING_FOUND)
+    if found.pca != facts.pca:
+        notes.append("pCa taken from constant calcium")
+    return replace(trial, facts=found), tuple(notes)
+
+
+def pca_of(trial: Trial) -> float | None:
+    """The pCa of a trial: as it says, or from calcium where that is constant; None where calcium changes."""
+    calcium = trial.calcium_um
+    if trial.facts.pca is not None or np.ptp(calcium) > 0.0 or calcium[0] <= 0.0:
+        return trial.facts.pca
+    return round(float(6.0 - np.log10(calcium[0])), _PCA_DIGITS)
+
+
+def _moves(length_m: Array) -> bool:
+    """Whether length changes, slowly or under noise: means of stretches of the record differ beyond their errors."""
+    parts = np.array_split(length_m, min(_PARTS, max(length_m.size // 4, 1)))
+    means = np.array([float(np.mean(part)) for part in parts])
+    errors = np.array([float(np.std(part)) / np.sqrt(part.size) for part in parts])
+    least = max(_LEAST_MOVE * float(np.median(length_m)), _ERRORS * float(np.median(errors)))
+    return bool(np.ptp(means) > least)
+
+
+def counted(notes: Iterable[tuple[str, ...]]) -> list[str]:
+    """Lines of all trials of a run, each once with the number of trials it holds for."""
+    counts: dict[str, int] = {}
+    for of_trial in notes:
+        for line in of_trial:
+            counts[line] = counts.get(line, 0) + 1
+    return [f"{line} ({n} trial{'s' if n > 1 else ''})" for line, n in counts.items()]
+
+
+def _length_for_phases(trial: Trial, unknown: frozenset[str], known: Known) -> float | None:
+    """L0 (m) by which speeds are judged; None for the record's median, where it is not sure."""
+    if known.reference_length_m is not None:
+        return known.reference_length_m
+    sure = "reference_length_m" not in unknown and not known.first_isometric
+    return trial.facts.reference_length_m if sure else None
+
+
+def _with_phases(trial: Trial, l0: float | None) -> Trial:
+    facts = trial.facts
+    phases = detect_phases(trial.time_s, trial.length_m, facts.amplitude_l0, facts.recovery_s, l0)
+    return replace(trial, facts=replace(facts, phases=phases))
+
+
+def _with_scales(trial: Trial, unknown: frozenset[str], known: Known) -> tuple[Trial, list[str]]:
+    """The trial with L0 and F0, and a line on those that are not the bag's own."""
+    notes, taken = [], []
+    file = f"of fibre file {known.file}"
+    l0, f0 = trial.facts.reference_length_m, trial.facts.f0_n
+    if known.first_isometric:
+        start = trial.length_m[initial_isometric(trial.time_s, trial.facts.phases)]
+        l0 = float(np.mean(start if start.size else trial.length_m[:1]))
+        notes.append(f"L0 is the length {'before the first stretch' if start.size else 'of the first sample'}")
+    elif known.reference_length_m is not None:
+        l0 = known.reference_length_m
+    elif "reference_length_m" in unknown:
+        l0 = known.file_reference_length_m
+        taken.append(f"L0 = {l0:g} m ({'as for normalised data' if l0 == 1.0 else file})")
+    if known.f0_n is not None:
+        f0 = known.f0_n
+    elif "f0_n" in unknown:
+        f0 = known.file_f0_n
+        taken.append(f"F0 = {f0:g} N ({'as for normalised data' if f0 == 1.0 else file})")
+    if taken:
+        notes.append(f"facts missing in the bag, taken: {', '.join(taken)}; --reference-length and --f0 give others")
+    return replace(trial, facts=replace(trial.facts, reference_length_m=l0, f0_n=f0)), notes
