@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import yaml
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import fast_yaml
 from xb_muscle_ros.trials.bag_files import METADATA, mcap_files
-from xb_muscle_ros.trials.mcap_records import Message, read_recording
+from xb_muscle_ros.trials.mcap_records import Message, Recording, read_recording
 
 
 @dataclass(frozen=True)
@@ -20,9 +21,12 @@ class BagContents:
 
     Attributes:
         path: the bag, as given.
-        types: message type of each topic.
+        types: message type of each topic, of those without messages too.
         encodings: message encoding of each topic.
-        messages: messages of each topic that has any, in the order of the files.
+        definitions: format and text of each message type that the bag describes.
+        messages: messages of each topic that has any, in the order of log time over all files; messages of one log
+            time keep the order of the files.
+        as_filed: the same in the order of the files, for topics where that is another one.
         custom_data: the bag's strings; None where they are lost.
         flaws: what is wrong with the bag and was lived with.
     """
@@ -30,13 +34,27 @@ class BagContents:
     path: Path
     types: dict[str, str]
     encodings: dict[str, str]
+    definitions: dict[str, tuple[str, str]]
     messages: dict[str, list[Message]]
+    as_filed: dict[str, list[Message]]
     custom_data: dict[str, str] | None
     flaws: tuple[str, ...]
 
+    @property
+    def flaws_text(self) -> str:
+        """The flaws in brackets after a blank; empty without any."""
+        return f" ({'; '.join(self.flaws)})" if self.flaws else ""
 
-def open_bag(path: Path) -> BagContents:
+
+def open_bag(path: Path, topics: Container[str] | None = None) -> BagContents:
     """Read a bag folder or a single ``.mcap`` file; damaged ones as far as they go.
+
+    Recorders write messages as they come; a file may be sorted otherwise, and a list of files too. The log time tells
+    the order. Quality of service plays no part.
+
+    Args:
+        path: the bag.
+        topics: messages of these alone are kept; None for all.
 
     Raises:
         UserError: it does not exist, is no MCAP bag, or holds no message.
@@ -44,29 +62,41 @@ def open_bag(path: Path) -> BagContents:
     if not path.exists():
         raise UserError(f"bag {path} does not exist; give a bag folder or an .mcap file")
     information, flaws = _information(path)
-    files = _files(path, information)
+    files, missing = _files(path, information)
+    flaws += missing
     types: dict[str, str] = {}
     encodings: dict[str, str] = {}
-    messages: dict[str, list[Message]] = {}
+    definitions: dict[str, tuple[str, str]] = {}
+    filed: dict[str, list[Message]] = {}
+    copies: list[tuple[str, dict[str, Any]]] = []
     for file in files:
-        try:
-            recording = read_recording(file)
-        except ValueError as problem:
-            raise UserError(f"bag {path}: {file.name} is no MCAP file: {problem}; record the bag again") from None
-        except OSError as problem:
-            raise UserError(f"bag {path}: {file.name} cannot be read: {problem.strerror}") from problem
+        recording = _recording(path, file, topics)
         types.update(recording.types)
         encodings.update(recording.encodings)
+        definitions.update(recording.definitions)
         for message in recording.messages:
-            messages.setdefault(message.topic, []).append(message)
+            filed.setdefault(message.topic, []).append(message)
         if recording.damage:
             flaws.append(f"{file.name} is {recording.damage}")
-        if information is None:
-            information = _parsed(recording.metadata.get("rosbag2", {}).get("serialized_metadata", ""))
-    if not messages:
+        copy = _parsed(recording.metadata.get("rosbag2", {}).get("serialized_metadata", ""))
+        if copy is not None:
+            copies.append((file.name, copy))
+    if not filed and topics is None:
         why = "; ".join(flaws) or "it holds no message"
         raise UserError(f"bag {path} is empty: {why}; record it again")
-    return BagContents(path, types, encodings, messages, _custom_data(information), tuple(flaws))
+    custom_data, note = _custom_data(information, copies)
+    messages = {topic: sorted(each, key=lambda message: message.log_time_ns) for topic, each in filed.items()}
+    as_filed = {topic: each for topic, each in filed.items() if each != messages[topic]}
+    return BagContents(path, types, encodings, definitions, messages, as_filed, custom_data, (*flaws, *note))
+
+
+def _recording(bag: Path, file: Path, topics: Container[str] | None) -> Recording:
+    try:
+        return read_recording(file, topics)
+    except ValueError as problem:
+        raise UserError(f"bag {bag}: {file.name} is no MCAP file: {problem}; record the bag again") from None
+    except OSError as problem:
+        raise UserError(f"bag {bag}: {file.name} cannot be read: {problem.strerror}") from problem
 
 
 def _information(path: Path) -> tuple[dict[str, Any] | None, list[str]]:
@@ -100,9 +130,11 @@ def _listed(information: dict[str, Any]) -> list[str]:
     return [Path(str(p)).name for p in paths] if isinstance(paths, list) else []
 
 
-def _files(path: Path, information: dict[str, Any] | None) -> list[Path]:
+def _files(path: Path, information: dict[str, Any] | None) -> tuple[list[Path], list[str]]:
+    """The bag's files, and what is wrong with the list of them."""
+    flaws: list[str] = []
     if path.is_file():
-        return [path]
+        return [path], flaws
     if information is not None:
         storage = information["storage_identifier"]
         if storage != "mcap":
@@ -115,15 +147,31 @@ def _files(path: Path, information: dict[str, Any] | None) -> list[Path]:
         listed = [path / name for name in _listed(information)]
         there = [file for file in listed if file.is_file()]
         if there and len(there) == len(listed):
-            return there
+            others = [file.name for file in mcap_files(path) if file not in there]
+            if others:
+                flaws.append(f"{METADATA} does not list {', '.join(others)}, which is left out")
+            return there, flaws
+        flaws += [f"{file.name}, which {METADATA} lists, is missing" for file in listed if file not in there]
     files = mcap_files(path)
     if not files:
         raise UserError(f"bag {path} is empty: it has no .mcap file; give a recorded bag")
-    return files
+    return files, flaws
 
 
-def _custom_data(information: dict[str, Any] | None) -> dict[str, str] | None:
-    if information is None:
-        return None
-    data = information.get("custom_data")
-    return {str(k): str(v) for k, v in data.items()} if isinstance(data, dict) else {}
+def _custom_data(
+    information: dict[str, Any] | None, copies: list[tuple[str, dict[str, Any]]]
+) -> tuple[dict[str, str] | None, list[str]]:
+    """Facts from ``metadata.yaml``, or where it has none (tools that make it anew lose them) from a copy in a file."""
+    facts = _strings(information)
+    if facts:
+        return facts, []
+    for name, copy in copies:
+        kept = _strings(copy)
+        if kept:
+            return kept, [f"{METADATA} has lost its custom_data; the copy within {name} is used"] if information else []
+    return (None if information is None and not copies else {}), []
+
+
+def _strings(information: dict[str, Any] | None) -> dict[str, str]:
+    data = None if information is None else information.get("custom_data")
+    return {str(key): str(value) for key, value in data.items()} if isinstance(data, dict) else {}

@@ -9,8 +9,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.mcap_records import read_recording
 
 METADATA = "metadata.yaml"
+# Parts of one recording lie no further apart than this, ns; a recording of its own does not begin so soon.
+SPLIT_GAP_NS = 1_000_000_000
 
 
 def find_bags(paths: Iterable[str | Path]) -> list[Path]:
@@ -85,14 +88,40 @@ def _runs(process: int) -> bool:
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a folder is one bag: it has metadata, or its ``.mcap`` files carry its name."""
+    """Whether a folder is one bag.
+
+    It is with metadata. Without, its ``.mcap`` files are one bag where there is one alone, where all carry the folder's
+    name, or where they carry one name with the numbers 0, 1, 2, ... that rosbag2 gives the parts of a bag and each
+    begins just after the one before. A folder that holds bag folders is none.
+    """
     if not path.is_dir():
         return False
     if (path / METADATA).is_file():
         return True
     files = mcap_files(path)
-    named_after = all(re.fullmatch(re.escape(path.name) + r"(_\d+)?", file.stem) for file in files)
-    return len(files) == 1 or (bool(files) and named_after)
+    if not files or any(is_bag(inside) for inside in path.iterdir() if inside.is_dir()):
+        return False
+    if len(files) == 1 or all(re.fullmatch(re.escape(path.name) + r"(_\d+)?", file.stem) for file in files):
+        return True
+    stems = {file.stem.rpartition("_")[0] for file in files}
+    numbered = [file.stem.rpartition("_")[2] for file in files] == [str(i) for i in range(len(files))]
+    return len(stems) == 1 and numbered and _follow_each_other(files)
+
+
+def _follow_each_other(files: list[Path]) -> bool:
+    """Whether files look like the parts of one recording: each begins after the one before, and soon."""
+    end_ns: int | None = None
+    for file in files:
+        try:
+            logged = [message.log_time_ns for message in read_recording(file).messages]
+        except (OSError, ValueError):
+            return False
+        if not logged:
+            continue
+        if end_ns is not None and not 0 <= min(logged) - end_ns <= SPLIT_GAP_NS:
+            return False
+        end_ns = max(logged)
+    return True
 
 
 def _bags_at(path: Path) -> list[Path]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -43,6 +43,7 @@ class Recording:
     Attributes:
         types: message type of each topic; a topic without schema has the type ''.
         encodings: encoding of each topic's messages, ``cdr`` in ROS 2.
+        definitions: format (``ros2msg`` or ``ros2idl``) and text of each message type that the file describes.
         messages: in the order of the file.
         metadata: named maps of strings; rosbag2 keeps a copy of its metadata in ``rosbag2``.
         damage: where and how the file ends too early; None for a whole file.
@@ -50,6 +51,7 @@ class Recording:
 
     types: dict[str, str] = field(default_factory=dict)
     encodings: dict[str, str] = field(default_factory=dict)
+    definitions: dict[str, tuple[str, str]] = field(default_factory=dict)
     messages: list[Message] = field(default_factory=list)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     damage: str | None = None
@@ -63,8 +65,12 @@ class _DamageError(Exception):
     """The file cannot be read beyond this point, for the reason given."""
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(path: Path, topics: Container[str] | None = None) -> Recording:
     """Read an MCAP file, whole or not.
+
+    Args:
+        path: the file.
+        topics: messages of these alone are kept; None for all.
 
     Raises:
         OSError: the file cannot be opened.
@@ -73,7 +79,7 @@ def read_recording(path: Path) -> Recording:
     data = path.read_bytes()
     if data[: len(MAGIC)] != MAGIC[: len(data)]:
         raise ValueError("it does not begin like an MCAP file")
-    reader = _Reader()
+    reader = _Reader(topics)
     try:
         reader.file(memoryview(data))
     except _CutError:
@@ -84,8 +90,9 @@ def read_recording(path: Path) -> Recording:
 
 
 class _Reader:
-    def __init__(self) -> None:
+    def __init__(self, topics: Container[str] | None) -> None:
         self.recording = Recording()
+        self._wanted = topics
         self._schemas: dict[int, str] = {}
         self._topics: dict[int, str] = {}
 
@@ -112,11 +119,16 @@ class _Reader:
                 channel, _, log_time_ns, _ = _MESSAGE.unpack_from(content)
                 if channel not in self._topics:
                     raise _DamageError(f"a message belongs to channel {channel}, which the file does not describe")
-                message = Message(self._topics[channel], log_time_ns, bytes(content[_MESSAGE.size :]))
-                self.recording.messages.append(message)
+                topic = self._topics[channel]
+                if self._wanted is None or topic in self._wanted:
+                    message = Message(topic, log_time_ns, bytes(content[_MESSAGE.size :]))
+                    self.recording.messages.append(message)
             elif opcode == Opcode.SCHEMA:
                 schema = Schema.read(_stream(content))
                 self._schemas[schema.id] = schema.name
+                if schema.data:
+                    text = bytes(schema.data).decode(errors="replace")
+                    self.recording.definitions[schema.name] = (schema.encoding, text)
             elif opcode == Opcode.CHANNEL:
                 described = Channel.read(_stream(content))
                 self._topics[described.id] = described.topic

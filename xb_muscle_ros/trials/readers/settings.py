@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.trials.readers.base import Reader
-from xb_muscle_ros.trials.readers.description import ImportMapping
+from xb_muscle_ros.trials.readers.description import ImportMapping, name_of
 from xb_muscle_ros.trials.readers.mapping import build_mapping
 from xb_muscle_ros.trials.readers.preparation import FoundF0, isometric_f0
 from xb_muscle_ros.trials.readers.registry import READERS, reader_for
 from xb_muscle_ros.trials.readers.tree import merged, subtree, text_at
 
 # Raised when the same file and mapping would make another trial than before.
-VERSION = 1
+VERSION = 2
 # Mappings, and F0 of preparations, that are kept: files come kind by kind and folder by folder.
 _KEPT = 64
 
@@ -88,7 +88,7 @@ class ImportSettings:
             MappingError: the mapping does not fit its format.
         """
         reader = reader_for(path, self._format)
-        matching = tuple(i for i, case in enumerate(self._cases) if case.files.search(path.stem))
+        matching = tuple(i for i, case in enumerate(self._cases) if case.files.search(name_of(path)))
         mapping, digest = self._mapping(reader, matching)
         if mapping.f0_at_pca is not None:
             f0, note = self._f0(path, reader, mapping, digest, mapping.f0_at_pca)
