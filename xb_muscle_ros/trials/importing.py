@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.bag_files import METADATA, clear_leftovers
+from xb_muscle_ros.trials.bag_files import METADATA, clear_leftovers, mcap_files
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.provenance import Provenance, provenance_of, recorded_provenance
 from xb_muscle_ros.trials.readers.assembly import trial_of
@@ -174,7 +174,7 @@ def _is_plain_bag(folder: Path) -> bool:
 
 def _recordings_in(folder: Path, out: Path | None) -> Iterator[Path]:
     """Recordings of a folder; a bag whose files lie beside other recordings is the folder itself."""
-    beside = READERS["bag"].matches(folder)
+    beside = READERS["bag"].matches(folder) and len(mcap_files(folder)) > 1
     if beside:
         yield folder
     for path in sorted(folder.iterdir()):

@@ -86,8 +86,8 @@ def gaps(where: str, signal: Signal, time_s: Array, mapping: ImportMapping) -> I
         i = max(found, key=lambda j: float(steps[j]))
         more = "" if len(found) == 1 else f", the largest of {len(found)} gaps"
         yield (
-            f"{where}, {signal.name}: samples are missing from {time_s[i]:.9g} to {time_s[i + 1]:.9g} s{more}; between "
-            "them lines are straight"
+            f"{where}, {signal.name}: samples are missing from {time_s[i]:.9g} to {time_s[i + 1]:.9g} s{more}; a "
+            "straight line is taken between them"
         )
 
 
@@ -95,7 +95,7 @@ def _candidates(steps: Array) -> list[int]:
     """Steps that may be gaps; with less than two others around there is nothing to compare with."""
     if steps.size < 3:
         return []
-    return [int(j) for j in np.flatnonzero(steps > GAP_STEPS * np.min(steps))]
+    return [int(j) for j in np.flatnonzero(steps > GAP_STEPS * np.quantile(steps, 0.1))]
 
 
 def times_of(signal: Signal, clock: Clock, recording: Recording, mapping: ImportMapping) -> Array:

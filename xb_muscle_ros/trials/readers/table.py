@@ -82,7 +82,7 @@ class Table:
         text = texts[first]
         more = f" (a run of {run} lines)" if run > 1 else ""
         if int(bad.sum()) > run:
-            more += f" and {int(bad.sum()) - run} more of the column do not either"
+            more += f"; so do {int(bad.sum()) - run} further lines"
         remedy = "needed is a finite number; mend or remove the line"
         if run > 1 and not text:
             remedy = "needed is a finite number; remove these lines, or fill them in where the signal is known"

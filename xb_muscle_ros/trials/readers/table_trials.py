@@ -75,8 +75,8 @@ def check_pca(table: Table, mapping: ImportMapping, part: Part, pca: float | Non
             others.append(f"'{name}'")
     if others:
         yield (
-            f"{table.path}: {', '.join(others)} are of another pCa by their names and are not read; import the file "
-            "again for each, with its --force-column, --pca and --trial"
+            f"{table.path}: not read, because of another pCa by name: {', '.join(others)}; import the file again for "
+            "each, with its --force-column, --pca and --trial"
         )
 
 
