@@ -220,7 +220,7 @@ def _check(path: Path, one: _Series, stamp: str) -> None:
         )
         raise UserError(
             f"{where}, message {one.numbers[i]}: its {stamp} stamp, {_shown(stamps[i])}, does not come after "
-            f"{_shown(stamps[i - 1])} of message {one.numbers[i - 1]} {more}; {remedy}"
+            f"{_shown(stamps[i - 1])} of message {one.numbers[i - 1]}{more}; {remedy}"
         )
 
 
