@@ -41,8 +41,8 @@ def test_a_fibre_as_it_should_be_gets_none(tmp_path: Path) -> None:
         ({"force": (FORCE, "N")}, {"f0": "1 N"}, "is N the unit of force and f0"),
         ({"force": (FORCE, "nN")}, {"f0": "1 nN"}, "thinner than a myofibril; is nN the unit"),
         (
-            {"length": (40 * (1 + STRAIN), "um")},
-            {"f0": "0.01 mN"},
+            {"length": (40 * (1 + STRAIN), "um"), "force": (FORCE, "uN")},
+            {"f0": "1 uN"},
             "L0 is 4e-05 m; usual is 5e-05 to 1 m; is um its unit?",
         ),
         ({"force": (1.5 * FORCE, "MPa")}, {"f0": "1.5 MPa"}, "F0 is 1.5e+06 Pa; usual is 1000 to 1e+06 Pa"),
