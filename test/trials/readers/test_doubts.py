@@ -63,6 +63,20 @@ def test_what_is_doubtful_is_told_in_one_line(
     assert words in told
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("length", 1.5, "line 52, column 'length': a single sample is at 1.25 L0 between 1 and 1 L0"),
+        ("force", 4.0, "line 52, column 'force': a single sample is at 4 F0 between 0.4 and 0.4 F0"),
+    ],
+)
+def test_a_single_sample_far_off_is_named(tmp_path: Path, name: str, value: float, words: str) -> None:
+    values = {"length": 1.2 * (1.0 + STRAIN), "force": FORCE.copy()}[name]
+    values[50] = value
+    told = warnings(tmp_path, {name: (values, {"length": "mm", "force": "mN"}[name])}, reference_length="1.2 mm")
+    assert any(words in warning for warning in told), told
+
+
 def test_a_column_called_pca_is_hardly_a_concentration(tmp_path: Path) -> None:
     rows = zip(TIME_S.tolist(), (1.2 * (1.0 + STRAIN)).tolist(), strict=True)
     (tmp_path / "a.csv").write_text("\n".join(["t,l,pCa", *(f"{t},{length},6.1" for t, length in rows)]))

@@ -68,6 +68,7 @@ def test_the_two_signs_for_micro_are_one(tmp_path: Path) -> None:
         ("a;b\n1.234,5;0,5\n", None, "'1.234,5'; thousands separators are not read"),
         ("a;b\n1 234,5;0,5\n", None, "'1 234,5'; thousands separators are not read"),
         ("a;b\n1.234;0,5\n", "comma", "holds '1.234'; thousands separators are not read"),
+        ("a;b\n0,001;2\n", "point", "holds '0,001'; if that is a decimal comma, give --decimal comma"),
         ("a;b\n1,5;2\n", "point", "holds '1,5'; if that is a decimal comma, give --decimal comma"),
         ("a;b\n;1\n;1\n3;1\n;1\n", None, r"line 2, .*nothing \(a run of 2 lines\); so do 1 further lines"),
     ],

@@ -13,7 +13,7 @@ from xb_muscle_ros.trials.readers.clock import GAP_STEPS, gaps, read_clock, time
 from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.readers.force import Context, read_force
 from xb_muscle_ros.trials.readers.length import Length, read_length
-from xb_muscle_ros.trials.readers.plausibility import f0_doubts, force_doubts
+from xb_muscle_ros.trials.readers.plausibility import SPIKE_F0, f0_doubts, force_doubts, spikes
 from xb_muscle_ros.trials.readers.recording import Recording
 from xb_muscle_ros.trials.trial import Array, Trial, TrialFacts
 
@@ -79,6 +79,11 @@ def trial_of(recording: Recording, mapping: ImportMapping, path: Path, isometric
             *force.warnings,
             *_coverage(recording, mapping, clock.time_s, force_s),
             *force_doubts(where, mapping, force.force_n / force.f0_n, calcium.pca),
+            *(
+                ()
+                if recording.force is None
+                else spikes(where, recording.force, force.force_n / force.f0_n, SPIKE_F0, "F0")
+            ),
             *f0_doubts(where, mapping, force.f0_n, length.reference_m),
             *_onset(recording, length),
         ),

@@ -9,7 +9,13 @@ import numpy as np
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.phases import detect_phases, initial_isometric
 from xb_muscle_ros.trials.readers.description import ImportMapping
-from xb_muscle_ros.trials.readers.plausibility import length_doubts, length_range_doubts, sarcomere_hint
+from xb_muscle_ros.trials.readers.plausibility import (
+    SPIKE_L0,
+    length_doubts,
+    length_range_doubts,
+    sarcomere_hint,
+    spikes,
+)
 from xb_muscle_ros.trials.readers.recording import Recording
 from xb_muscle_ros.trials.trial import Array, Phase
 
@@ -65,6 +71,7 @@ def read_length(
     warnings += (
         *length_doubts(recording.where, mapping, reference_m),
         *length_range_doubts(recording.where, length_m, reference_m),
+        *spikes(recording.where, signal, length_m / reference_m, SPIKE_L0, "L0"),
     )
     if mapping.length_of != "fibre":
         length_m, reference_m = length_m / reference_m, 1.0

@@ -90,7 +90,7 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
     made = ImportMapping(
         where=where,
         fibre=fibre,
-        data_set=str(tree.get("data_set", fibre)),
+        data_set=_name(tree, "data_set", fibre, where),
         source=words_at(tree, "source"),
         time=columns.time,
         length=columns.length,
@@ -106,7 +106,7 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
         largest_step_s=columns.largest_step_s,
         force_zero_from_slack=columns.force_zero_from_slack,
         activation=None if activation is None else read_activation(subtree(activation, "activation", where), where),
-        trial=str(tree.get("trial", "{file}")),
+        trial=_name(tree, "trial", "{file}", where),
         reference_length=None
         if reference == FIRST_ISOMETRIC
         else quantity(reference, "length", "reference_length", where),
@@ -125,6 +125,10 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
     _check_force(made)
     _check_calcium(made, columns, made.activation)
     return made
+
+
+def _name(tree: Mapping[str, Any], key: str, default: str, where: str) -> str:
+    return text_at(tree, key, where, needed="give a name, or leave it out") if key in tree else default
 
 
 def _check_length(made: ImportMapping) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from xb_muscle_ros.trials.readers.description import ImportMapping
+from xb_muscle_ros.trials.readers.recording import Signal
 from xb_muscle_ros.trials.trial import Array
 
 # Isometric stress of muscle at full activation, weak to strong, Pa.
@@ -33,6 +34,8 @@ USUAL_LENGTH_L0 = (0.5, 1.6)
 # At this pCa and below muscle bears force; its largest is at least this part of F0.
 ACTIVE_PCA = 6.0
 LEAST_ACTIVE_F0 = 0.01
+# A single sample further from both of its neighbours is a disturbance.
+SPIKE_L0, SPIKE_F0 = 0.05, 1.0
 # The median force of a trial lies within these, F0.
 USUAL_FORCE_F0 = (-0.1, 3.0)
 
@@ -74,6 +77,27 @@ def length_range_doubts(where: str, length_m: Array, reference_m: float) -> Iter
         yield (
             f"{where}: the median length is {middle:.3g} L0 (L0 = {reference_m:.6g} m); usual is {low:g} to {high:g}; "
             "check the reference length and the unit of length"
+        )
+
+
+def spikes(where: str, signal: Signal, values: Array, limit: float, unit: str) -> Iterator[str]:
+    """A line where single samples leave both of their neighbours, to the same side, by more than a limit.
+
+    Args:
+        where: the trial, for messages.
+        signal: whose values they are.
+        values: shape (n,), relative to L0 or F0.
+        limit: what no single sample departs by, in the same unit.
+        unit: its name.
+    """
+    off = values[1:-1] - values[:-2], values[1:-1] - values[2:]
+    found = np.flatnonzero((off[0] * off[1] > 0.0) & (np.minimum(np.abs(off[0]), np.abs(off[1])) > limit)) + 1
+    if found.size:
+        i = int(found[0])
+        more = f", the first of {found.size} such" if found.size > 1 else ""
+        yield (
+            f"{signal.place(where, i)}: a single sample is at {values[i]:.4g} {unit} between {values[i - 1]:.4g} and "
+            f"{values[i + 1]:.4g} {unit}{more}; mend it if it is a disturbance"
         )
 
 

@@ -120,11 +120,20 @@ class ImportSettings:
             told = json.dumps([VERSION, reader.name, self.isometric_scaling, _with_text_keys(tree)], sort_keys=True)
             try:
                 made = build_mapping(tree, self._where, reader.kind)
+                _check_format(made, reader)
             except UserError as problem:
                 raise MappingError(str(problem)) from None
             _make_room(self._mappings)
             self._mappings[key] = made, hashlib.sha256(told.encode()).hexdigest()
         return self._mappings[key]
+
+
+def _check_format(made: ImportMapping, reader: Reader) -> None:
+    """What only tables have."""
+    told = {"columns.trial": made.trial_column, "decimal": made.decimal, "columns.time.rate": made.rate_hz}
+    unused = next((key for key, value in told.items() if value is not None), None)
+    if unused is not None and reader.name != "csv":
+        raise UserError(f"{made.where}: {unused} is for tables (csv), the file is {reader.name}; leave it out")
 
 
 def _with_text_keys(tree: object) -> object:
