@@ -64,6 +64,23 @@ def check_replaceable(path: Path) -> None:
         )
 
 
+def remove_results(found: Iterable[Path]) -> None:
+    """Remove files and bags of an older run; a folder that is not a bag alone stays, and so does what is in it.
+
+    Raises:
+        UserError: one of them cannot be removed.
+    """
+    for path in found:
+        try:
+            if path.is_dir() and not path.is_symlink():
+                if all(file.name == METADATA or file.suffix == ".mcap" for file in path.iterdir()):
+                    shutil.rmtree(path)
+            else:
+                path.unlink(missing_ok=True)
+        except OSError as problem:
+            raise UserError(f"{path} of an older run cannot be removed: {problem.strerror}; remove it") from problem
+
+
 def clear_leftovers(folder: Path) -> None:
     """Undo what a killed run left half done in a folder of bags: parts of a bag go, an older bag comes back."""
     for left in list(folder.glob(".*.tmp")) + list(folder.glob(".*.old")):

@@ -168,17 +168,17 @@ def _is_plain_bag(folder: Path) -> bool:
         return False
     if (folder / METADATA).is_file():
         return True
-    others = [suffix for suffix in recording_suffixes() if suffix != ".mcap"]
-    return not any(path.suffix.lower() in others for path in folder.iterdir())
+    kinds = {path.suffix.lower() for path in folder.iterdir()} & set(recording_suffixes())
+    return kinds in ({".mcap"}, {".db3"})
 
 
 def _recordings_in(folder: Path, out: Path | None) -> Iterator[Path]:
-    """Recordings of a folder; a bag whose files lie beside other recordings is the folder itself."""
-    beside = READERS["bag"].matches(folder) and len(mcap_files(folder)) > 1
-    if beside:
+    """Recordings of a folder; a split bag whose files lie beside other recordings is the folder itself."""
+    split = READERS["bag"].matches(folder) and len(mcap_files(folder)) > 1
+    if split:
         yield folder
     for path in sorted(folder.iterdir()):
-        if beside and path.suffix.lower() == ".mcap":
+        if split and path.suffix.lower() == ".mcap":
             continue
         if path.name.startswith(".") or path.resolve() == out:
             continue

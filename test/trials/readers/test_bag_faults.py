@@ -13,7 +13,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from xb_muscle_ros.trials import ros_types
-from xb_muscle_ros.trials.importing import Failed, FileDone, Imported, find_recordings, import_recordings
+from xb_muscle_ros.trials.importing import Failed, Imported, find_recordings, import_recordings
 from xb_muscle_ros.trials.readers.settings import ImportSettings
 from xb_muscle_ros.trials.trial import Trial
 
@@ -189,12 +189,13 @@ def test_quality_of_service_in_the_metadata_is_of_no_account(tmp_path: Path) -> 
     assert trial(path, tmp_path).time_s.size == COUNT
 
 
-def test_a_split_bag_without_metadata_is_one_trial(tmp_path: Path) -> None:
-    path = write(tmp_path / "split", rig(), split=COUNT)
+@pytest.mark.parametrize("storage", list(StoragePlugin))
+def test_a_split_bag_without_metadata_is_one_trial(tmp_path: Path, storage: StoragePlugin) -> None:
+    path = write(tmp_path / "split", rig(), storage, split=COUNT)
     found = trial(path, tmp_path)
     assert (found.facts.trial, found.time_s.size) == ("split", COUNT)
     assert any("metadata.yaml is missing" in warning for warning in found.warnings)
-    one = trial(path / "rig_1.mcap", tmp_path)
+    one = trial(next(path.glob("rig_1.*")), tmp_path)
     assert one.time_s.size == COUNT // 2
     assert any(f"looks like one part of several; give the folder {path}" in warning for warning in one.warnings)
 
@@ -206,12 +207,27 @@ def test_a_table_beside_the_files_of_a_bag_is_not_overlooked(tmp_path: Path) -> 
     assert find_recordings([tmp_path]) == [path, path / "more.csv"]
 
 
-def test_sqlite_parts_without_metadata_say_what_to_do(tmp_path: Path) -> None:
+def test_sqlite_files_that_are_no_parts_say_what_to_do(tmp_path: Path) -> None:
     path = write(tmp_path / "split", rig(), StoragePlugin.SQLITE3, split=COUNT)
+    (path / "rig_0.db3").rename(path / "rig_7.db3")
     settings = ImportSettings({**tree(), "format": "bag"}, "here")
-    events = [e for e in import_recordings([path], settings, tmp_path / "bags") if not isinstance(e, FileDone)]
-    assert isinstance(events[0], Failed)
-    assert "make it anew with ros2 bag reindex" in events[0].why
+    (event, _) = import_recordings([path], settings, tmp_path / "bags")
+    assert isinstance(event, Failed)
+    assert "make it anew with ros2 bag reindex" in event.why
+
+
+@pytest.mark.parametrize("size", [0, 100])
+def test_a_file_cut_before_its_first_message_is_empty(tmp_path: Path, size: int) -> None:
+    path = write(tmp_path / "rig", rig())
+    file = next(path.glob("*.mcap"))
+    file.write_bytes(file.read_bytes()[:size])
+    assert f"is empty: {file.name} is cut short after {size} bytes" in refusal(path, tmp_path)
+
+
+def test_forces_of_another_clock_are_refused(tmp_path: Path) -> None:
+    rows = [(topic, t, message if topic == "/joints" else load(86400 + t, 0.3)) for topic, t, message in rig()]
+    why = refusal(write(tmp_path / "rig", rows), tmp_path)
+    assert "force begins at 86400 s, after the lengths have ended at 0.399 s" in why
 
 
 def test_a_message_that_cannot_be_decoded_is_named(raw_bag: Any, tmp_path: Path) -> None:

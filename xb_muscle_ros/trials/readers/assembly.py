@@ -104,6 +104,11 @@ def _coverage(recording: Recording, mapping: ImportMapping, time_s: Array, force
     force = recording.force
     if force is None or force.times is None:
         return
+    if force_s[0] > time_s[-1]:
+        raise UserError(
+            f"{recording.where}, {force.name}: force begins at {force_s[0]:.6g} s, after the lengths have ended at "
+            f"{time_s[-1]:.6g} s; both have to be of one clock; record them together, or try 'stamp: log'"
+        )
     yield from gaps(recording.where, force, force_s, mapping)
     apart_s = GAP_STEPS * max(float(np.median(np.diff(each))) if each.size > 1 else 0.0 for each in (time_s, force_s))
     if force_s[0] - time_s[0] > apart_s or abs(time_s[-1] - force_s[-1]) > apart_s:

@@ -21,7 +21,7 @@ from xb_muscle_ros.trials.readers.base import Pending, begin_of
 from xb_muscle_ros.trials.readers.columns import BAG
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping
 from xb_muscle_ros.trials.readers.fields import FieldPath
-from xb_muscle_ros.trials.readers.foreign_bag import SQLITE, ForeignBag, open_foreign
+from xb_muscle_ros.trials.readers.foreign_bag import SQLITE, ForeignBag, open_foreign, sqlite_parts
 from xb_muscle_ros.trials.readers.recording import Recording, Signal
 from xb_muscle_ros.trials.trial import Array
 
@@ -67,7 +67,7 @@ class BagReader:
     def matches(self, path: Path) -> bool:
         """Whether it is a bag's folder, or a file that begins or is called like a bag's."""
         if path.is_dir():
-            return (path / METADATA).is_file() or is_bag(path)
+            return (path / METADATA).is_file() or is_bag(path) or bool(sqlite_parts(path))
         if path.suffix.lower() in self.suffixes:
             return True
         begin = begin_of(path, len(SQLITE))
@@ -159,6 +159,8 @@ def _read(path: Path, wanted: Mapping[str, Column], stamp: str) -> tuple[Foreign
     found = {key: _Series(column, FieldPath(column.field, f"bag {path}")) for key, column in wanted.items()}
     topics = {column.name for column in wanted.values()}
     bag = open_foreign(path, topics)
+    if not bag.topics:
+        raise UserError(f"bag {path} is empty: {'; '.join(bag.flaws) or 'it has no topic'}; record it again")
     for topic in sorted(topics):
         if topic not in bag.topics:
             raise UserError(

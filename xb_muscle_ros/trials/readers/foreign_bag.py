@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
@@ -12,6 +13,9 @@ from xb_muscle_ros.trials.bag_contents import open_bag
 from xb_muscle_ros.trials.bag_files import METADATA
 from xb_muscle_ros.trials.bag_messages import AnyMessage, decoded
 from xb_muscle_ros.trials.readers.base import begin_of
+
+if TYPE_CHECKING:
+    from rosbags.highlevel import AnyReader
 
 SQLITE = b"SQLite format 3\x00"
 
@@ -54,33 +58,48 @@ def _is_sqlite(path: Path) -> bool:
     return path.suffix.lower() == ".db3" or begin_of(path, len(SQLITE)) == SQLITE
 
 
+def sqlite_parts(folder: Path) -> list[Path]:
+    """The files of a split SQLite bag without metadata, in order: one name with the numbers 0, 1, 2, ...; or none."""
+    found = {file.stem.rpartition("_")[2]: file for file in folder.glob("*.db3")}
+    names = {file.stem.rpartition("_")[0] for file in folder.glob("*.db3")}
+    if (folder / METADATA).is_file() or len(names) != 1 or set(found) != {str(i) for i in range(len(found))}:
+        return []
+    return [found[str(i)] for i in range(len(found))]
+
+
 def _sqlite(path: Path, wanted: Collection[str]) -> ForeignBag:
-    from rosbags.highlevel import AnyReader
-
+    files = [path]
+    flaws: tuple[str, ...] = ()
     if path.is_dir() and not (path / METADATA).is_file():
-        raise UserError(f"bag {path} has no {METADATA}; make it anew with ros2 bag reindex {path} sqlite3")
-    try:
-        with AnyReader([path], default_typestore=ros_types.typestore()) as reader:
-            topics = tuple(dict.fromkeys(connection.topic for connection in reader.connections))
-            counts = {topic: reader.topics[topic].msgcount for topic in wanted if topic in topics}
-    except Exception as problem:  # the library passes on what its parsers trip over
-        raise _unreadable(path, problem) from problem
-    return ForeignBag(topics, counts, _sqlite_messages(path, wanted), ())
+        files, flaws = sqlite_parts(path), (f"{METADATA} is missing",)
+        if not files:
+            raise UserError(f"bag {path} has no {METADATA}; make it anew with ros2 bag reindex {path} sqlite3")
+    topics: dict[str, None] = {}
+    counts = dict.fromkeys(wanted, 0)
+    for file in files:
+        with _opened(path, file) as reader:
+            topics.update(dict.fromkeys(connection.topic for connection in reader.connections))
+            for topic in set(wanted) & set(reader.topics):
+                counts[topic] += reader.topics[topic].msgcount
+    return ForeignBag(tuple(topics), counts, _sqlite_messages(path, files, wanted), flaws)
 
 
-def _sqlite_messages(path: Path, wanted: Collection[str]) -> Iterator[AnyMessage]:
+def _sqlite_messages(path: Path, files: list[Path], wanted: Collection[str]) -> Iterator[AnyMessage]:
+    for file in files:
+        with _opened(path, file) as reader:
+            used = [connection for connection in reader.connections if connection.topic in wanted]
+            for connection, log_ns, data in reader.messages(connections=used) if used else ():
+                yield AnyMessage(connection.topic, log_ns, reader.deserialize(data, connection.msgtype))
+
+
+@contextmanager
+def _opened(path: Path, file: Path) -> Iterator[AnyReader]:
     from rosbags.highlevel import AnyReader
 
     try:
-        with AnyReader([path], default_typestore=ros_types.typestore()) as reader:
-            used = [connection for connection in reader.connections if connection.topic in wanted]
-            for connection, log_ns, data in reader.messages(connections=used):
-                yield AnyMessage(connection.topic, log_ns, reader.deserialize(data, connection.msgtype))
+        with AnyReader([file], default_typestore=ros_types.typestore()) as reader:
+            yield reader
     except UserError:  # of what is done with the messages
         raise
-    except Exception as problem:
-        raise _unreadable(path, problem) from problem
-
-
-def _unreadable(path: Path, problem: Exception) -> UserError:
-    return UserError(f"bag {path} cannot be read: {problem}; record or convert it again")
+    except Exception as problem:  # the library passes on what its parsers trip over
+        raise UserError(f"bag {path} cannot be read: {problem}; record or convert it again") from problem

@@ -30,7 +30,7 @@ HALF_SARCOMERE_M = (0.8e-6, 1.9e-6)
 USUAL_STEP_S = (2.5e-5, 5e-2)
 # Calcium with muscle in it, µM: pCa 10 to 3.
 USUAL_CALCIUM_UM = (1e-4, 1e3)
-USUAL_LENGTH_L0 = (0.5, 1.6)
+USUAL_LENGTH_L0 = (0.45, 1.6)
 # At this pCa and below muscle bears force; its largest is at least this part of F0.
 ACTIVE_PCA = 6.0
 LEAST_ACTIVE_F0 = 0.01
