@@ -32,6 +32,15 @@ def shared_data(repo_root: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
+def shared_cases(shared_data: Path) -> Path:
+    """Small inputs with faults that users met, kept beside the recordings; tests that need them are skipped without."""
+    folder = shared_data.parent / "cases"
+    if not folder.is_dir():
+        pytest.skip(f"no cases at {folder}")
+    return folder
+
+
+@pytest.fixture(scope="session")
 def new_domain() -> Iterator[Callable[[], int]]:
     """Gives ROS domains of this test run's own, on this machine only; tests that need one are skipped without ROS."""
     try:

@@ -15,7 +15,15 @@ from scipy.io import savemat
 from xb_muscle_ros.trials import importing
 from xb_muscle_ros.trials.bag_files import clear_leftovers
 from xb_muscle_ros.trials.bags import find_bags, read_trial, write_trial
-from xb_muscle_ros.trials.importing import Failed, FileDone, Imported, Kept, bag_name, import_recordings
+from xb_muscle_ros.trials.importing import (
+    Failed,
+    FileDone,
+    Imported,
+    Kept,
+    bag_name,
+    find_recordings,
+    import_recordings,
+)
 from xb_muscle_ros.trials.provenance import recorded_provenance
 from xb_muscle_ros.trials.readers.settings import ImportSettings
 from xb_muscle_ros.trials.trial import Trial
@@ -197,11 +205,43 @@ def test_a_broken_file_does_not_keep_its_name_from_another(tmp_path: Path) -> No
     assert _kinds(_run(files, tmp_path / "bags")) == ["Failed", "Imported"]
 
 
+def test_points_in_names_are_kept(tmp_path: Path) -> None:
+    names = ("s_pCa6.0.csv", "s_pCa6.2.csv", "plain_pCa6.0", "plain_pCa6.2", "fa1.txt", "b1.CSV", "x.d01")
+    events = _run([_file(tmp_path / name) for name in names], tmp_path / "bags", fibre="fa")
+    found = [event.bag.name for event in events if isinstance(event, Imported)]
+    assert found == [
+        *("fa_s_pCa6.0", "fa_s_pCa6.2", "fa_plain_pCa6.0", "fa_plain_pCa6.2", "fa_fa1", "fa_b1", "fa_x.d01"),
+    ]
+
+
+def test_bags_with_points_in_their_names_stay_apart(tmp_path: Path, trial: Trial) -> None:
+    for name in ("sss_pCa6.0", "sss_pCa6.2"):
+        write_trial(tmp_path / "raw" / name, trial)
+    settings = ImportSettings(
+        {"fibre": "f", "file_name": {"pattern": r"pCa(?P<pca>[\d.]+)$"}, "reference_length": "0.5717 mm"}, "here"
+    )
+    events = list(import_recordings(find_recordings([tmp_path / "raw"]), settings, tmp_path / "bags"))
+    made = [event for event in events if isinstance(event, Imported)]
+    assert [event.bag.name for event in made] == ["f_sss_pCa6.0", "f_sss_pCa6.2"]
+    assert [event.trial.facts.pca for event in made] == [6.0, 6.2]
+
+
+def test_trials_that_would_have_one_name_are_named(tmp_path: Path) -> None:
+    events = _run([_file(tmp_path / name) for name in ("a 1.csv", "a_1.csv", "a_1")], tmp_path / "bags")
+    assert _kinds(events) == ["Imported", "Failed", "Failed"]
+    assert all("would both become" in event.why for event in events if isinstance(event, Failed))
+
+
 @pytest.mark.parametrize(
     ("data_set", "trial", "name"),
     [
         ("cat", "ramp 1", "cat_ramp_1"),
         ("cat", "cat_1", "cat_1"),
+        ("cat", "cat", "cat"),
+        ("a", "a1", "a_a1"),
+        ("a", "b1", "a_b1"),
+        ("a", "a-1", "a_a-1"),
+        ("my cat", "my cat_1", "my_cat_1"),
         ("c/a..t", "é", "c_a..t__"),
         ("..", "x", "_x"),
     ],

@@ -22,10 +22,14 @@ if TYPE_CHECKING:
 FORMATS = ("bag", "csv", "mat", "slc")
 # option: (key of the mapping, argument type, help)
 _OPTIONS: dict[str, tuple[tuple[str, ...], type, str]] = {
+    "--trial": (("trial",), str, "name of the trial (default: the file's)"),
+    "--trial-column": (("columns", "trial", "column"), str, "column whose value tells the trials of a table apart"),
+    "--decimal": (("decimal",), str, "'point' or 'comma' (default: what the table shows)"),
     "--fiber": (("fibre",), str, "name of the fibre"),
     "--data-set": (("data_set",), str, "begins the names of the bags (default: the fibre)"),
     "--source": (("source",), str, "where the data come from, in words"),
     "--time-column": (("columns", "time", "column"), str, "column of time"),
+    "--rate": (("columns", "time", "rate"), str, "samples in a second where there is no column of time: '1000 Hz'"),
     "--time-unit": (("columns", "time", "unit"), str, "its unit"),
     "--length-column": (("columns", "length", "column"), str, "column of length"),
     "--length-unit": (("columns", "length", "unit"), str, "its unit"),
@@ -34,7 +38,11 @@ _OPTIONS: dict[str, tuple[tuple[str, ...], type, str]] = {
         str,
         "'absolute' length (default) or 'change' from the reference length",
     ),
-    "--length-of": (("columns", "length", "of"), str, "length of the 'fibre' (default) or a 'half_sarcomere'"),
+    "--length-of": (
+        ("columns", "length", "of"),
+        str,
+        "length of the 'fibre' (default), a 'sarcomere' or a 'half_sarcomere'",
+    ),
     "--reference-length": (
         ("reference_length",),
         str,

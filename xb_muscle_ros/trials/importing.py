@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.bag_files import clear_leftovers
+from xb_muscle_ros.trials.bag_files import METADATA, clear_leftovers, mcap_files
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.provenance import Provenance, provenance_of, recorded_provenance
 from xb_muscle_ros.trials.readers.assembly import trial_of
@@ -58,7 +58,7 @@ def find_recordings(paths: Iterable[Path], out: Path | None = None) -> list[Path
     """
     found: list[Path] = []
     for path in paths:
-        if not path.is_dir() or READERS["bag"].matches(path):
+        if not path.is_dir() or _is_plain_bag(path):
             found.append(path)
             continue
         inside = list(_recordings_in(path, None if out is None else out.resolve()))
@@ -91,9 +91,13 @@ def import_recordings(
 
 
 def bag_name(data_set: str, trial: str) -> str:
-    """Name of a trial's bag: data set and trial, in characters every file system and shell takes."""
-    name = trial if trial.startswith(data_set) else f"{data_set}_{trial}"
-    return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).lstrip(".-")
+    """Name of a trial's bag: ``<data set>_<trial>``, in characters every file system and shell takes.
+
+    A trial whose name is the data set's, or begins with it and ``_``, does not get it twice.
+    """
+    first, name = (re.sub(r"[^A-Za-z0-9_.-]+", "_", text) for text in (data_set, trial))
+    whole = name if name == first or name.startswith(f"{first}_") else f"{first}_{name}"
+    return whole.lstrip(".-")
 
 
 class _Run(NamedTuple):
@@ -158,15 +162,30 @@ def _other(recorded: Provenance | None, origin: Provenance) -> str:
     return f", made of {'another content of ' if same else ''}{name}"
 
 
+def _is_plain_bag(folder: Path) -> bool:
+    """Whether a folder is a bag and nothing else: without metadata, other recordings may lie beside a bag's files."""
+    if not READERS["bag"].matches(folder):
+        return False
+    if (folder / METADATA).is_file():
+        return True
+    kinds = {path.suffix.lower() for path in folder.iterdir()} & set(recording_suffixes())
+    return kinds in ({".mcap"}, {".db3"})
+
+
 def _recordings_in(folder: Path, out: Path | None) -> Iterator[Path]:
+    """Recordings of a folder; a split bag whose files lie beside other recordings is the folder itself."""
+    split = READERS["bag"].matches(folder) and len(mcap_files(folder)) > 1
+    if split:
+        yield folder
     for path in sorted(folder.iterdir()):
+        if split and path.suffix.lower() == ".mcap":
+            continue
         if path.name.startswith(".") or path.resolve() == out:
             continue
         if path.is_dir():
-            if READERS["bag"].matches(path):
-                if folder.resolve() != out:
-                    yield path
-            else:
+            if not _is_plain_bag(path):
                 yield from _recordings_in(path, out)
+            elif folder.resolve() != out:
+                yield path
         elif path.suffix.lower() in recording_suffixes():
             yield path

@@ -25,7 +25,8 @@ def _mapping(length: str = "mm", force: str = "kPa", **keys: Any) -> ImportMappi
         "force": {"column": "f", "unit": force},
         **keys.pop("columns", {}),
     }
-    return build_mapping({"fibre": "f1", "pca": 6.1, "columns": columns, **keys}, "here")
+    tree = {"fibre": "f1", "pca": 6.1, "columns": columns, **keys}
+    return build_mapping({key: value for key, value in tree.items() if value is not None}, "here")
 
 
 def _file(folder: Path, time: np.ndarray, length: np.ndarray, force: np.ndarray, **more: np.ndarray) -> Path:
@@ -92,7 +93,7 @@ def test_half_sarcomeres_are_stored_relative_to_rest(tmp_path: Path) -> None:
 
 def test_calcium_that_changes_is_kept_where_it_does(tmp_path: Path) -> None:
     pca = np.where(TIME_S < 0.05, 9.0, 4.5)
-    mapping = _mapping("L0", "F0", columns={"calcium": {"column": "ca", "unit": "pCa"}})
+    mapping = _mapping("L0", "F0", pca=None, columns={"calcium": {"column": "ca", "unit": "pCa"}})
     trial = read_csv(_file(tmp_path, TIME_S, 1 + STRAIN, FORCE, ca=pca), mapping)
     assert trial.calcium_time_s.tolist() == [0.0, 0.05]
     assert trial.calcium_um == pytest.approx([1e-3, 10**1.5])
@@ -100,7 +101,7 @@ def test_calcium_that_changes_is_kept_where_it_does(tmp_path: Path) -> None:
 
 
 def test_constant_calcium_tells_pca(tmp_path: Path) -> None:
-    mapping = _mapping("L0", "F0", columns={"calcium": {"column": "ca", "unit": "nM"}})
+    mapping = _mapping("L0", "F0", pca=None, columns={"calcium": {"column": "ca", "unit": "nM"}})
     trial = read_csv(_file(tmp_path, TIME_S, 1 + STRAIN, FORCE, ca=np.full(300, 100.0)), mapping)
     assert trial.calcium_um == pytest.approx([0.1])
     assert trial.facts.pca == pytest.approx(7.0)

@@ -137,3 +137,12 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"no\.csv cannot be read: No such file"):
         reader_for(tmp_path / "no.csv")
     assert reader_for(_file(tmp_path, "a.bin", b"\x00"), "mat") is READERS["mat"]
+
+
+@pytest.mark.parametrize("keys", [{"columns": {"trial": {"column": "run"}}}, {"decimal": "comma"}])
+def test_what_only_tables_have_is_refused_elsewhere(tmp_path: Path, keys: dict[str, Any]) -> None:
+    (tmp_path / "a.slc").write_text("SLCONTROL_DATA_FILE")
+    with pytest.raises(
+        MappingError, match=r"(columns\.trial|decimal) is for tables \(csv\), the file is slc; leave it"
+    ):
+        ImportSettings(keys, "here").prepare(tmp_path / "a.slc")

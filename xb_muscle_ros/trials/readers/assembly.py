@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.readers.calcium import read_calcium
-from xb_muscle_ros.trials.readers.clock import read_clock, times_of
+from xb_muscle_ros.trials.readers.calcium import PCA_RANGE, read_calcium
+from xb_muscle_ros.trials.readers.clock import GAP_STEPS, gaps, read_clock, times_of
 from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.readers.force import Context, read_force
 from xb_muscle_ros.trials.readers.length import Length, read_length
+from xb_muscle_ros.trials.readers.plausibility import SPIKE_F0, f0_doubts, force_doubts, spikes
 from xb_muscle_ros.trials.readers.recording import Recording
 from xb_muscle_ros.trials.trial import Array, Trial, TrialFacts
 
 # The test stretch may begin this much later or earlier than the file tells, s.
 ONSET_TOLERANCE_S = 0.005
-FACT_RANGES = {"pca": (1.0, 12.0), "amplitude_l0": (0.0, 1.0), "recovery_s": (0.0, 1e4)}
+FACT_RANGES = {"pca": PCA_RANGE, "amplitude_l0": (0.0, 1.0), "recovery_s": (0.0, 1e4)}
 
 
 def trial_of(recording: Recording, mapping: ImportMapping, path: Path, isometric_scaling: bool | None = None) -> Trial:
@@ -69,7 +71,22 @@ def trial_of(recording: Recording, mapping: ImportMapping, path: Path, isometric
         calcium_um=calcium.calcium_um,
         force_time_s=force.time_s,
         force_n=force.force_n,
-        warnings=(*recording.warnings, *clock.warnings, *length.warnings, *force.warnings, *_onset(recording, length)),
+        warnings=(
+            *recording.warnings,
+            *clock.warnings,
+            *length.warnings,
+            *calcium.warnings,
+            *force.warnings,
+            *_coverage(recording, mapping, clock.time_s, force_s),
+            *force_doubts(where, mapping, force.force_n / force.f0_n, calcium.pca),
+            *(
+                ()
+                if recording.force is None
+                else spikes(where, recording.force, force.force_n / force.f0_n, SPIKE_F0, "F0")
+            ),
+            *f0_doubts(where, mapping, force.f0_n, length.reference_m),
+            *_onset(recording, length),
+        ),
     )
 
 
@@ -80,6 +97,25 @@ def _check_facts(recording: Recording, mapping: ImportMapping) -> None:
             raise UserError(
                 f"{recording.where}: {name} is {value:g}; allowed is {low:g} to {high:g}; look at {mapping.where}"
             )
+
+
+def _coverage(recording: Recording, mapping: ImportMapping, time_s: Array, force_s: Array) -> Iterator[str]:
+    """Lines where a force with its own clock has gaps, or begins or ends far from where the lengths do."""
+    force = recording.force
+    if force is None or force.times is None:
+        return
+    if force_s[0] > time_s[-1]:
+        raise UserError(
+            f"{recording.where}, {force.name}: force begins at {force_s[0]:.6g} s, after the lengths have ended at "
+            f"{time_s[-1]:.6g} s; both have to be of one clock; record them together, or try 'stamp: log'"
+        )
+    yield from gaps(recording.where, force, force_s, mapping)
+    apart_s = GAP_STEPS * max(float(np.median(np.diff(each))) if each.size > 1 else 0.0 for each in (time_s, force_s))
+    if force_s[0] - time_s[0] > apart_s or abs(time_s[-1] - force_s[-1]) > apart_s:
+        yield (
+            f"{recording.where}, {force.name}: force is there from {force_s[0]:.6g} to {force_s[-1]:.6g} s, length "
+            f"from {time_s[0]:.6g} to {time_s[-1]:.6g} s"
+        )
 
 
 def _onset(recording: Recording, length: Length) -> tuple[str, ...]:

@@ -1,46 +1,53 @@
-"""Trials from ROS 2 bags of others, MCAP or SQLite, by a mapping of topics and fields.
-
-A field is a path into the message such as ``position[0]``, ``wrench.force.z`` or ``data``; a name in brackets picks
-the joint of that name in a JointState (``position[knee]``).
-"""
+"""Trials from ROS 2 bags of others, MCAP or SQLite, by a mapping of topics and fields (see `fields`)."""
 
 from __future__ import annotations
 
 import re
 from array import array
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
-from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
-from xb_muscle_ros.trials.bag_contents import open_bag
 from xb_muscle_ros.trials.bag_files import METADATA, is_bag
-from xb_muscle_ros.trials.bag_messages import AnyMessage, decoded
 from xb_muscle_ros.trials.mcap_records import MAGIC
-from xb_muscle_ros.trials.readers.base import Pending
+from xb_muscle_ros.trials.readers.base import Pending, begin_of
 from xb_muscle_ros.trials.readers.columns import BAG
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping
+from xb_muscle_ros.trials.readers.fields import FieldPath
+from xb_muscle_ros.trials.readers.foreign_bag import SQLITE, ForeignBag, open_foreign, sqlite_parts
 from xb_muscle_ros.trials.readers.recording import Recording, Signal
 from xb_muscle_ros.trials.trial import Array
 
-_MAGIC = {b"\x89MCAP0\r\n": ".mcap", b"SQLite format 3\x00": ".db3"}
-_STEP = re.compile(r"([A-Za-z_]\w*)((?:\[[^\[\]]+\])*)")
 
+@dataclass
+class _Series:
+    """One signal: where its numbers are, and what was found.
 
-class _Joint(str):
-    """Name of a joint in the path to a field."""
+    Attributes:
+        column: topic, field and unit.
+        path: to the field.
+        stamps_ns, values: of the messages that have it.
+        numbers: which message of the topic each is, from 0.
+        joints: names seen in messages that are not of the joint.
+        at_index: the joint an index picks, as the first message has it.
+        skipped: messages that are not of the joint.
+    """
 
-
-class _Series(NamedTuple):
-    stamps_ns: npt.NDArray[np.int64]
-    values: Array
+    column: Column
+    path: FieldPath
+    stamps_ns: array[int] = field(default_factory=lambda: array("q"))
+    values: array[float] = field(default_factory=lambda: array("d"))
+    numbers: array[int] = field(default_factory=lambda: array("q"))
+    joints: dict[str, None] = field(default_factory=dict)
+    at_index: str | None = None
+    skipped: int = 0
 
 
 class BagReader:
@@ -58,16 +65,13 @@ class BagReader:
     }
 
     def matches(self, path: Path) -> bool:
-        """Whether it is a folder that is a bag and holds nothing else, or a file that begins or is called like one."""
+        """Whether it is a bag's folder, or a file that begins or is called like a bag's."""
         if path.is_dir():
-            return is_bag(path) and ((path / METADATA).is_file() or all(_is_mcap(file) for file in path.iterdir()))
+            return (path / METADATA).is_file() or is_bag(path) or bool(sqlite_parts(path))
         if path.suffix.lower() in self.suffixes:
             return True
-        if not path.is_file():
-            return False
-        with path.open("rb") as file:
-            begin = file.read(16)
-        return any(begin.startswith(magic) for magic in _MAGIC)
+        begin = begin_of(path, len(SQLITE))
+        return begin.startswith(MAGIC) or begin == SQLITE
 
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
         """The one trial of the bag."""
@@ -86,18 +90,11 @@ def _recording(path: Path, mapping: ImportMapping) -> Recording:
         "stimulation": None if mapping.stimulation is None else mapping.stimulation.column,
     }
     wanted = {key: column for key, column in columns.items() if column is not None}
-    series, flaws = _read(path, wanted, mapping.time.name)
-    first_ns = int(series["length"].stamps_ns[0])
-    signals = {key: _signal(wanted[key], one, first_ns, key) for key, one in series.items()}
+    bag, found = _read(path, wanted, mapping.time.name)
+    first_ns = int(found["length"].stamps_ns[0])
+    signals = {key: _signal(one, first_ns, key) for key, one in found.items()}
     length = signals["length"]
     assert length.times is not None  # every signal of a bag has its own
-    late = {key: one.values.size - signals[key].values.size for key, one in series.items()}
-    warnings = flaws
-    if late.get("force"):
-        warnings += (
-            f"bag {path}: {late['force']} messages on {wanted['force'].name} come before the first length; "
-            "they are left out",
-        )
     begin = datetime.fromtimestamp(first_ns / 1e9, tz=timezone.utc).isoformat(timespec="milliseconds")
     return Recording(
         where=f"bag {path}",
@@ -109,85 +106,129 @@ def _recording(path: Path, mapping: ImportMapping) -> Recording:
         stimulation=signals.get("stimulation"),
         facts=mapping.facts_of(path),
         notes=(f"time 0 is stamp {first_ns} ns ({begin})",),
-        warnings=warnings,
+        warnings=(*_state(path, bag), *_left_out(path, found, signals)),
     )
 
 
-def _signal(column: Column, one: _Series, first_ns: int, key: str) -> Signal:
+def _state(path: Path, bag: ForeignBag) -> Iterator[str]:
+    """What is wrong with the bag's files."""
+    if bag.flaws:
+        yield f"bag {path}: {'; '.join(bag.flaws)}; {sum(bag.counts.values())} messages were read"
+    number = re.fullmatch(r"(.+_)\d+", path.stem)
+    if path.is_file() and number is not None:
+        others = [f for f in path.parent.glob(f"{number.group(1)}*{path.suffix}") if f != path]
+        if any(re.fullmatch(re.escape(number.group(1)) + r"\d+", other.stem) for other in others):
+            yield f"bag {path} looks like one part of several; give the folder {path.parent} for all of them"
+
+
+def _left_out(path: Path, found: Mapping[str, _Series], signals: Mapping[str, Signal]) -> Iterator[str]:
+    """Messages that are not taken over."""
+    told = set()
+    for one in found.values():
+        topic, joint = one.column.name, one.path.joint
+        if one.skipped and (topic, joint) not in told:
+            told.add((topic, joint))
+            yield (
+                f"bag {path}: {one.skipped} of {one.skipped + len(one.values)} messages on {topic} have no joint "
+                f"'{joint}' and are skipped; they name {', '.join(one.joints) or 'none'}"
+            )
+    if "force" in found:
+        late = len(found["force"].values) - signals["force"].values.size
+        if late:
+            yield (
+                f"bag {path}: {late} messages on {found['force'].column.name} come before the first length; they are "
+                "left out"
+            )
+
+
+def _signal(one: _Series, first_ns: int, key: str) -> Signal:
     """A topic from the first length on; what holds until it changes begins with what held then."""
-    times = (one.stamps_ns - first_ns) / np.float64(1e9)
+    times = (np.array(one.stamps_ns, dtype=np.int64) - first_ns) / np.float64(1e9)
+    values: Array = np.array(one.values)
     first = int(np.searchsorted(times, 0.0))
     if key in ("calcium", "stimulation") and first and (first == times.size or times[first] > 0.0):
         first -= 1
         times[first] = 0.0
-    at = partial(_message, first)
-    return Signal(f"{column.name} {column.field}", one.values[first:], at, times[first:])
+    numbers = one.numbers[first:]
+    name = f"{one.column.name} {one.column.field}"
+    return Signal(name, values[first:], lambda i: f"message {numbers[i]}", times[first:])
 
 
-def _message(first: int, i: int) -> str:
-    return f"message {first + i}"
-
-
-def _read(path: Path, wanted: dict[str, Column], stamp: str) -> tuple[dict[str, _Series], tuple[str, ...]]:
-    """Stamps and values of the wanted signals, messages one by one, and what is wrong with the bag."""
-    steps = {key: _steps(column, path) for key, column in wanted.items()}
-    stamps = {key: array("q") for key in wanted}
-    values = {key: array("d") for key in wanted}
-    messages, flaws = _messages(path, list(wanted.values()))
-    for topic, log_ns, message in messages:
-        for key, column in wanted.items():
-            if column.name == topic:
-                where = f"bag {path}, {column.name}, message {len(values[key])}"
-                stamps[key].append(log_ns if stamp == "log" else _header_ns(message, where))
-                values[key].append(_value(message, steps[key], f"{where}, {column.field}"))
-    for key, column in wanted.items():
-        if not values[key]:
-            raise UserError(f"bag {path} has no message on {column.name}; record the topic")
-    return {key: _Series(np.array(stamps[key], dtype=np.int64), np.array(values[key])) for key in wanted}, flaws
-
-
-def _messages(path: Path, wanted: list[Column]) -> tuple[Iterator[AnyMessage], tuple[str, ...]]:
-    """Messages of the wanted topics, and what is wrong with the bag and was lived with."""
-    topics = {column.name for column in wanted}
-    if (path.is_file() and not _is_mcap(path)) or (path.is_dir() and not any(map(_is_mcap, path.iterdir()))):
-        return _by_library(path, wanted), ()
-    bag = open_bag(path, topics)
-    _check_topics(path, wanted, bag.types)
-    flaws = (f"bag {path}: {'; '.join(bag.flaws)}; what is whole was read",) if bag.flaws else ()
-    return decoded(bag), flaws
-
-
-def _by_library(path: Path, wanted: list[Column]) -> Iterator[AnyMessage]:
-    """Messages of a bag that is stored as SQLite."""
-    from rosbags.highlevel import AnyReader
-
-    try:
-        with AnyReader([path], default_typestore=ros_types.typestore()) as reader:
-            _check_topics(path, wanted, [connection.topic for connection in reader.connections])
-            topics = {column.name for column in wanted}
-            used = [connection for connection in reader.connections if connection.topic in topics]
-            for connection, log_ns, data in reader.messages(connections=used):
-                yield AnyMessage(connection.topic, log_ns, reader.deserialize(data, connection.msgtype))
-    except UserError:
-        raise
-    except Exception as problem:  # the library passes on what its parsers trip over
-        raise UserError(f"bag {path} cannot be read: {problem}; record or convert it again") from problem
-
-
-def _check_topics(path: Path, wanted: list[Column], topics: Iterable[str]) -> None:
-    for column in wanted:
-        if column.name not in topics:
+def _read(path: Path, wanted: Mapping[str, Column], stamp: str) -> tuple[ForeignBag, dict[str, _Series]]:
+    """Stamps and values of the wanted signals; stamps increase."""
+    found = {key: _Series(column, FieldPath(column.field, f"bag {path}")) for key, column in wanted.items()}
+    topics = {column.name for column in wanted.values()}
+    bag = open_foreign(path, topics)
+    if not bag.topics:
+        raise UserError(f"bag {path} is empty: {'; '.join(bag.flaws) or 'it has no topic'}; record it again")
+    for topic in sorted(topics):
+        if topic not in bag.topics:
             raise UserError(
-                f"bag {path} has no topic {column.name}; its topics: {', '.join(sorted(topics))}; name the "
-                "topic in columns of the mapping"
+                f"bag {path} has no topic {topic}; its topics: {', '.join(sorted(bag.topics))}; name the topic in "
+                "columns of the mapping"
             )
+        if not bag.counts[topic]:
+            flaws = f" ({'; '.join(bag.flaws)})" if bag.flaws else ""
+            raise UserError(f"bag {path} has no message on {topic}{flaws}; record the topic")
+    numbers = dict.fromkeys(topics, 0)
+    for topic, log_ns, message in bag.messages:
+        where = f"bag {path}, {topic}, message {numbers[topic]}"
+        for one in found.values():
+            if one.column.name == topic:
+                _take(one, message, numbers[topic], log_ns if stamp == "log" else None, where)
+        numbers[topic] += 1
+    for one in found.values():
+        _check(path, one, stamp)
+    return bag, found
 
 
-def _is_mcap(path: Path) -> bool:
-    if not path.is_file():
-        return False
-    with path.open("rb") as file:
-        return file.read(len(MAGIC)) == MAGIC
+def _take(one: _Series, message: Any, i: int, log_ns: int | None, where: str) -> None:
+    """Take a message over, or count it as one of another joint."""
+    if not one.path.has_joint(message, where):
+        one.skipped += 1
+        one.joints.update(dict.fromkeys(map(str, message.name)))
+        return
+    joint = one.path.joint_at_index(message)
+    if one.at_index is None:
+        one.at_index = joint
+    elif joint is not None and joint != one.at_index:
+        raise UserError(
+            f"{where}, {one.path.text} is of joint '{joint}', earlier ones of '{one.at_index}'; name the joint, for "
+            f"example {one.path.text.partition('[')[0]}[{one.at_index}]"
+        )
+    one.values.append(one.path.value(message, where))
+    one.stamps_ns.append(_header_ns(message, where) if log_ns is None else log_ns)
+    one.numbers.append(i)
+
+
+def _check(path: Path, one: _Series, stamp: str) -> None:
+    """Make sure that there is something, in order of time: nothing may be looked up in times before."""
+    where = f"bag {path}, {one.column.name}"
+    if not one.values:
+        raise UserError(
+            f"{where}, {one.path.text}: there is no joint '{one.path.joint}' in any of {one.skipped} messages; joints "
+            f"there: {', '.join(one.joints) or 'none'}"
+        )
+    stamps: npt.NDArray[np.int64] = np.array(one.stamps_ns, dtype=np.int64)
+    back = np.flatnonzero(np.diff(stamps) <= 0)
+    if back.size:
+        i = int(back[0]) + 1
+        more = f" ({back.size} such in all)" if back.size > 1 else ""
+        unset = stamp == "header" and not stamps.any()
+        remedy = (
+            "the sender leaves the stamps unset; use 'columns: {time: {stamp: log}}'"
+            if unset
+            else "time has to increase; record it anew, or cut the bag there"
+        )
+        raise UserError(
+            f"{where}, message {one.numbers[i]}: its {stamp} stamp, {_shown(stamps[i])}, does not come after "
+            f"{_shown(stamps[i - 1])} of message {one.numbers[i - 1]}{more}; {remedy}"
+        )
+
+
+def _shown(stamp_ns: np.int64) -> str:
+    """A stamp in s, all of its digits."""
+    return f"{int(stamp_ns) // 10**9}.{int(stamp_ns) % 10**9:09d} s"
 
 
 def _header_ns(message: Any, where: str) -> int:
@@ -196,40 +237,3 @@ def _header_ns(message: Any, where: str) -> int:
         return int(stamp.sec) * 10**9 + int(stamp.nanosec)
     except AttributeError:
         raise UserError(f"{where} has no header; use 'columns: {{time: {{stamp: log}}}}'") from None
-
-
-def _steps(column: Column, path: Path) -> list[str | int]:
-    """The attributes, indices and joint names that lead to a field."""
-    steps: list[str | int] = []
-    for part in column.field.split("."):
-        match = _STEP.fullmatch(part)
-        if match is None:
-            raise UserError(f"bag {path}: field '{column.field}' is no path such as position[0] or wrench.force.z")
-        steps.append(match.group(1))
-        for index in re.findall(r"\[([^\[\]]+)\]", match.group(2)):
-            steps.append(int(index) if index.isdecimal() else _Joint(index))
-    return steps
-
-
-def _value(message: Any, steps: list[str | int], where: str) -> float:
-    found = message
-    for step in steps:
-        try:
-            if isinstance(step, int):
-                found = found[step]
-            elif isinstance(step, _Joint):
-                found = found[list(message.name).index(step)]
-            else:
-                found = getattr(found, step)
-        except AttributeError:
-            fields = [name for name in vars(found) if not name.startswith("_")] if hasattr(found, "__dict__") else []
-            raise UserError(f"{where}: there is no {step}; fields: {', '.join(fields) or 'none'}") from None
-        except (IndexError, ValueError, TypeError):
-            wanted = f"joint '{step}'" if isinstance(step, _Joint) else f"value {step}"
-            raise UserError(f"{where}: there is no {wanted}") from None
-    try:
-        return float(found)
-    except (TypeError, ValueError):
-        raise UserError(
-            f"{where} is a {type(found).__name__}; needed is a number; name an index or a field of it"
-        ) from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -11,20 +12,25 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.activation import Interval, force_drop, stimulated_intervals
 from xb_muscle_ros.trials.readers.clock import Clock, times_of
 from xb_muscle_ros.trials.readers.description import Activation, ImportMapping
+from xb_muscle_ros.trials.readers.plausibility import calcium_doubts
 from xb_muscle_ros.trials.readers.recording import Recording, Signal
 from xb_muscle_ros.trials.trial import Array
 
 # Beyond these it is no free calcium, or its unit is wrong.
 CALCIUM_RANGE_UM = (0.0, 1e5)
+PCA_RANGE = (1.0, 12.0)
+# pCa is noted to a tenth.
+SAME_PCA = 0.05
 
 
 class Calcium(NamedTuple):
-    """Times (s) and values (µM) of calcium where it changes, pCa where it does not, and notes for the source."""
+    """Times (s) and values (µM) of calcium where it changes, pCa where it does not, notes, and warnings."""
 
     time_s: Array
     calcium_um: Array
     pca: float | None
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 def read_calcium(recording: Recording, mapping: ImportMapping, clock: Clock, pca: float | None) -> Calcium:
@@ -41,13 +47,28 @@ def read_calcium(recording: Recording, mapping: ImportMapping, clock: Clock, pca
                 f"{recording.where}: calcium is not known; give --pca, a calcium column or a file name pattern"
             )
         return Calcium(clock.time_s[:1], np.array([10.0 ** (6.0 - pca)]), pca)
-    return _by_column(recording, recording.calcium, mapping, clock)
+    found = _by_column(recording, recording.calcium, mapping, clock)
+    if pca is not None and (found.pca is None or abs(found.pca - pca) > SAME_PCA):
+        shown = "changes" if found.pca is None else f"is pCa {found.pca:.4g}"
+        raise UserError(
+            f"{recording.where}: pCa is given as {pca:g}, but calcium of {recording.calcium.name} {shown}; leave one "
+            "of them out"
+        )
+    return found
 
 
 def _by_column(recording: Recording, signal: Signal, mapping: ImportMapping, clock: Clock) -> Calcium:
     assert mapping.calcium is not None  # there is a signal
     unit = mapping.calcium.unit
     is_pca = unit.kind == "pCa"
+    if is_pca:
+        absurd = np.flatnonzero(~((signal.values >= PCA_RANGE[0]) & (signal.values <= PCA_RANGE[1])))
+        if absurd.size:
+            i = int(absurd[0])
+            raise UserError(
+                f"{signal.place(recording.where, i)} is pCa {signal.values[i]:g}; allowed is {PCA_RANGE[0]:g} to "
+                f"{PCA_RANGE[1]:g}; is it a concentration?"
+            )
     calcium_um = 10.0 ** (6.0 - signal.values) if is_pca else signal.values * unit.factor
     low, high = CALCIUM_RANGE_UM
     bad = np.flatnonzero(~((calcium_um >= low) & (calcium_um <= high)))
@@ -62,7 +83,19 @@ def _by_column(recording: Recording, signal: Signal, mapping: ImportMapping, clo
     if np.count_nonzero(changes) == 1 and calcium_um[0] > 0.0:
         pca = float(signal.values[0]) if is_pca else float(6.0 - np.log10(calcium_um[0]))
     time_s = times_of(signal, clock, recording, mapping)
-    return Calcium(time_s[changes], calcium_um[changes], pca)
+    warnings = [*calcium_doubts(recording.where, mapping, calcium_um)]
+    if not is_pca and re.match(r"p[ _-]?ca([^a-z0-9]|$)", mapping.calcium.name, re.IGNORECASE):
+        warnings.append(
+            f"{recording.where}: {signal.name} is read in {mapping.calcium.unit_name} but called pCa; is pCa its unit?"
+        )
+    count = int(np.count_nonzero(changes)) - 1
+    if count:
+        at = int(np.flatnonzero(changes)[1])
+        warnings.append(
+            f"{recording.where}: {signal.name} changes {count} times, first at {time_s[at]:.6g} s from "
+            f"{calcium_um[at - 1]:.4g} to {calcium_um[at]:.4g} µM; this is one trial of changing calcium without a pCa"
+        )
+    return Calcium(time_s[changes], calcium_um[changes], pca, warnings=tuple(warnings))
 
 
 def _by_activation(recording: Recording, mapping: ImportMapping, activation: Activation, clock: Clock) -> Calcium:

@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.assembly import trial_of
 from xb_muscle_ros.trials.readers.base import Pending, begin_of, by_columns
 from xb_muscle_ros.trials.readers.columns import FILE
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping
 from xb_muscle_ros.trials.readers.recording import Recording, Signal
-from xb_muscle_ros.trials.readers.table import read_table
+from xb_muscle_ros.trials.readers.table import Table, read_table
+from xb_muscle_ros.trials.readers.table_trials import Part, check_pca, parts_of
+from xb_muscle_ros.trials.readers.text_file import looks_like_text
 from xb_muscle_ros.trials.trial import Trial
 
 _LOOKED_AT_BYTES = 4096
 
 
 class CsvReader:
-    """Comma, semicolon or tab separated columns below a header line, one trial to a file."""
+    """Comma, semicolon or tab separated columns below a header line.
+
+    A file is one trial, unless a column tells trials apart or time starts anew; their names then have the column's
+    value, or the number from 1, behind the file's.
+    """
 
     name = "csv"
     suffixes: tuple[str, ...] = (".csv", ".tsv")
@@ -29,36 +40,49 @@ class CsvReader:
         """Whether the file is called so or holds text."""
         if path.suffix.lower() in self.suffixes:
             return True
-        begin = begin_of(path, _LOOKED_AT_BYTES)
-        return bool(begin) and b"\x00" not in begin
+        return looks_like_text(begin_of(path, _LOOKED_AT_BYTES))
 
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
-        """The one trial of the file."""
-        yield Pending(mapping.trial_of(path), lambda: read_recording(path, mapping))
+        """The trials of the table; it is read whole."""
+        table = read_table(path, mapping.decimal)
+        for i, part in enumerate(parts_of(table, mapping)):
+            told = table.told if i == 0 else ()
+            yield Pending(_name(path, mapping, part), partial(_recording, table, mapping, part, told))
 
     def pca(self, path: Path, mapping: ImportMapping) -> float | None:
-        """As the file's name or the mapping tells."""
-        return mapping.facts_of(path)["pca"]
+        """As the file's name or the mapping tells; None where a column does."""
+        return None if mapping.calcium is not None else mapping.facts_of(path)["pca"]
 
 
 def read_csv(path: Path, mapping: ImportMapping, isometric_scaling: bool | None = None) -> Trial:
-    """Read the trial of one file; see `assembly.trial_of` for what is done to it.
+    """Read the trial of a file that holds one; see `assembly.trial_of` for what is done to it.
 
     Raises:
-        UserError: a missing column, a cell that is no finite number, or what `assembly.trial_of` refuses.
+        UserError: a missing column, a cell that is no finite number, several trials, or what `assembly.trial_of`
+            refuses.
     """
-    return trial_of(read_recording(path, mapping), mapping, path, isometric_scaling)
+    pending = list(CsvReader().trials(path, mapping))
+    if len(pending) > 1:
+        raise UserError(f"{path} holds {len(pending)} trials; import them with xb_muscle import")
+    return trial_of(pending[0].read(), mapping, path, isometric_scaling)
 
 
-def read_recording(path: Path, mapping: ImportMapping) -> Recording:
-    """The columns of one file.
+def _name(path: Path, mapping: ImportMapping, part: Part) -> str:
+    return "_".join(text for text in (mapping.trial_of(path), part.name) if text)
 
-    Raises:
-        UserError: the file is no table, or a column is missing or holds what is no finite number.
-    """
-    table = read_table(path)
+
+def _recording(table: Table, mapping: ImportMapping, part: Part, told: tuple[str, ...]) -> Recording:
+    """The columns of one trial in a table."""
+    where = f"{table.path}, trial {_name(table.path, mapping, part)}" if part.name else str(table.path)
+    facts = mapping.facts_of(table.path)
+
+    def at(i: int) -> str:
+        return f"line {table.line(int(part.rows[i]))}"
 
     def signal(column: Column) -> Signal:
-        return Signal(f"column '{column.name}'", table.numbers(column.name), lambda i: f"line {table.line(i)}")
+        if column is mapping.time and mapping.rate_hz is not None:
+            return Signal(column.name, np.arange(part.rows.size) / mapping.rate_hz, at)
+        return Signal(f"column '{column.name}'", table.numbers(column.name)[part.rows], at)
 
-    return by_columns(str(path), mapping, signal, mapping.trial_of(path), mapping.facts_of(path))
+    found = by_columns(where, mapping, signal, _name(table.path, mapping, part), facts)
+    return replace(found, warnings=(*told, *part.told, *check_pca(table, mapping, part, facts["pca"])))

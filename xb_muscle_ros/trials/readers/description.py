@@ -14,7 +14,13 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.activation import CalciumTransient
 from xb_muscle_ros.trials.readers.units import Quantity, Unit
 
+# What a length may be the length of, the first by default.
+LENGTHS_OF = ("fibre", "half_sarcomere", "sarcomere")
 FACTS = ("pca", "amplitude_l0", "recovery_s")
+
+
+# Endings of files that tell a format and are no part of a name.
+ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc", ".mat", ".slc", ".mcap", ".db3")
 
 
 class Column(NamedTuple):
@@ -64,8 +70,12 @@ class ImportMapping:
         stimulation: a column of stimulation a file may have.
         activation: makes calcium of stimulation.
         trial: name of the trial, with ``{file}`` and ``{folder}`` as in ``fibre``.
+        trial_column: a column of a table whose value tells its trials apart; None for one called so, if any.
+        decimal: decimal mark of a table, `numerals.POINT` or `numerals.COMMA`; None for what its cells show.
+        rate_hz: samples in a second, where there is no column of time.
         length_is_change: the length column holds the change from the reference length.
-        half_sarcomere: the length column is that of a half-sarcomere, so lengths are stored relative to L0 = 1 m.
+        length_of: what the length column is the length of, one of `LENGTHS_OF`; lengths of sarcomeres and halves of
+            them are stored relative to L0 = 1 m.
         reference_length: the length that is L0; None for the mean of the first isometric samples.
         at_reference: what the length column reads where the fibre has its reference length; None for that length.
         largest_step_s: samples may be this far apart, s; None for what a muscle's record usually has.
@@ -92,8 +102,11 @@ class ImportMapping:
     stimulation: Stimulation | None = None
     activation: Activation | None = None
     trial: str = "{file}"
+    trial_column: str | None = None
+    decimal: str | None = None
+    rate_hz: float | None = None
     length_is_change: bool = False
-    half_sarcomere: bool = False
+    length_of: str = "fibre"
     reference_length: Quantity | None = None
     at_reference: float | None = None
     largest_step_s: float | None = None
@@ -118,7 +131,7 @@ class ImportMapping:
         """
         facts: dict[str, float | None] = {name: getattr(self, name) for name in FACTS}
         if self.file_name is not None:
-            match = self.file_name.search(path.stem)
+            match = self.file_name.search(name_of(path))
             if match is None:
                 raise UserError(
                     f"{path}: the file name does not match '{self.file_name.pattern}' of {self.where}; "
@@ -143,9 +156,18 @@ class ImportMapping:
         return filled(self.trial, path)
 
 
+def name_of(path: Path) -> str:
+    """Name of a recording: that of the folder, or of the file without the ending that tells its format.
+
+    Only known endings are cut, so that ``run_pCa6.0`` and ``run_pCa6.2`` keep theirs.
+    """
+    name = path.resolve().name if path.name in ("", ".", "..") else path.name
+    return name[: -len(path.suffix)] if path.suffix.lower() in ENDINGS and not path.is_dir() else name
+
+
 def filled(template: str, path: Path) -> str:
-    """A name with ``{file}`` (without ending) and ``{folder}`` put in."""
-    return template.replace("{file}", path.stem).replace("{folder}", path.resolve().parent.name)
+    """A name with ``{file}`` (see `name_of`) and ``{folder}`` put in."""
+    return template.replace("{file}", name_of(path)).replace("{folder}", path.resolve().parent.name)
 
 
 def finite(value: object, key: str, where: str) -> float:

@@ -9,6 +9,13 @@ import numpy as np
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.phases import detect_phases, initial_isometric
 from xb_muscle_ros.trials.readers.description import ImportMapping
+from xb_muscle_ros.trials.readers.plausibility import (
+    SPIKE_L0,
+    length_doubts,
+    length_range_doubts,
+    sarcomere_hint,
+    spikes,
+)
 from xb_muscle_ros.trials.readers.recording import Recording
 from xb_muscle_ros.trials.trial import Array, Phase
 
@@ -16,7 +23,7 @@ from xb_muscle_ros.trials.trial import Array, Phase
 LENGTH_RANGE_L0 = (0.1, 3.0)
 # From the shortest piece of a fibre to the longest fibres there are (Harris et al. 2005: human sartorius, 0.6 m).
 L0_RANGE_M = (1e-5, 0.7)
-HALF_SARCOMERE_RANGE_M = (0.5e-6, 3e-6)
+SARCOMERE_RANGE_M = (0.5e-6, 6e-6)
 
 
 class Length(NamedTuple):
@@ -61,7 +68,12 @@ def read_length(
         reference_m = float(np.mean(isometric))
     _check(recording, mapping, length_m, reference_m)
     notes = (_note(mapping, relative, found, reference_m),)
-    if mapping.half_sarcomere:
+    warnings += (
+        *length_doubts(recording.where, mapping, reference_m),
+        *length_range_doubts(recording.where, length_m, reference_m),
+        *spikes(recording.where, signal, length_m / reference_m, SPIKE_L0, "L0"),
+    )
+    if mapping.length_of != "fibre":
         length_m, reference_m = length_m / reference_m, 1.0
     return Length(length_m, reference_m, phases, notes, warnings)
 
@@ -73,13 +85,12 @@ def _check(recording: Recording, mapping: ImportMapping, length_m: Array, refere
             f"{where}, {signal.name} begins with {reference_m:.6g} m; a length is above 0; "
             "does the column hold a change of length?"
         )
-    low, high = HALF_SARCOMERE_RANGE_M if mapping.half_sarcomere else L0_RANGE_M
+    low, high = L0_RANGE_M if mapping.length_of == "fibre" else SARCOMERE_RANGE_M
     if column.unit.kind == "length" and not low <= reference_m <= high:
-        what = "half-sarcomeres" if mapping.half_sarcomere else "fibres"
-        raise UserError(
-            f"{where}, {signal.name}: L0 is {reference_m:.6g} m; {what} have {low:g} to {high:g} m; is "
-            f"{column.unit_name} its unit?"
-        )
+        what = "fibres" if mapping.length_of == "fibre" else "sarcomeres and their halves"
+        hint = sarcomere_hint(reference_m) if mapping.length_of == "fibre" else ""
+        hint = hint or f"is {column.unit_name} its unit?"
+        raise UserError(f"{where}, {signal.name}: L0 is {reference_m:.6g} m; {what} have {low:g} to {high:g} m; {hint}")
     length_l0 = length_m / reference_m
     low, high = LENGTH_RANGE_L0
     bad = np.flatnonzero(~((length_l0 >= low) & (length_l0 <= high)))
@@ -96,8 +107,9 @@ def _note(mapping: ImportMapping, relative: bool, found: bool, reference_m: floa
     if relative:
         return "lengths come relative to L0 and are stored with 1 m for L0"
     how = "mean before the first change of length" if found else "given"
-    if mapping.half_sarcomere:
-        return f"half-sarcomere lengths relative to {reference_m:.6g} m ({how}), stored with 1 m for L0"
+    if mapping.length_of != "fibre":
+        what = mapping.length_of.replace("_", "-")
+        return f"{what} lengths relative to {reference_m:.6g} m ({how}), stored with 1 m for L0"
     note = f"L0 = {reference_m:.6g} m ({how})"
     if mapping.length_is_change:
         return f"{note}; the recorded change of length is added to it"

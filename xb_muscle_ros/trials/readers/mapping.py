@@ -16,15 +16,28 @@ import yaml
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.columns import BAG, FILE, Columns, read_columns
 from xb_muscle_ros.trials.readers.description import FACTS, Activation, ImportMapping, finite
+from xb_muscle_ros.trials.readers.numerals import DECIMALS
 from xb_muscle_ros.trials.readers.stimulus import read_activation
-from xb_muscle_ros.trials.readers.tree import check_keys, subtree, text_at, words_at
+from xb_muscle_ros.trials.readers.tree import check_keys, choice_at, subtree, text_at, words_at
 from xb_muscle_ros.trials.readers.units import Quantity, quantity
 
 __all__ = ["BAG", "FILE", "FIRST_ISOMETRIC", "ImportMapping", "build_mapping", "load_mapping"]
 
 FIRST_ISOMETRIC = "first_isometric"
 _TOP = (
-    *("fibre", "trial", "data_set", "source", "columns", "reference_length", "f0", "activation", "phases", "file_name"),
+    *(
+        "fibre",
+        "trial",
+        "data_set",
+        "source",
+        "decimal",
+        "columns",
+        "reference_length",
+        "f0",
+        "activation",
+        "phases",
+        "file_name",
+    ),
     *("isometric_scaling", *FACTS),
 )
 
@@ -77,7 +90,7 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
     made = ImportMapping(
         where=where,
         fibre=fibre,
-        data_set=str(tree.get("data_set", fibre)),
+        data_set=_name(tree, "data_set", fibre, where),
         source=words_at(tree, "source"),
         time=columns.time,
         length=columns.length,
@@ -85,12 +98,15 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
         calcium=columns.calcium,
         stimulation=columns.stimulation,
         length_is_change=columns.length_is_change,
-        half_sarcomere=columns.half_sarcomere,
+        length_of=columns.length_of,
+        trial_column=columns.trial_column,
+        rate_hz=columns.rate_hz,
+        decimal=choice_at(tree, "decimal", DECIMALS, "", where) if "decimal" in tree else None,
         at_reference=columns.at_reference,
         largest_step_s=columns.largest_step_s,
         force_zero_from_slack=columns.force_zero_from_slack,
         activation=None if activation is None else read_activation(subtree(activation, "activation", where), where),
-        trial=str(tree.get("trial", "{file}")),
+        trial=_name(tree, "trial", "{file}", where),
         reference_length=None
         if reference == FIRST_ISOMETRIC
         else quantity(reference, "length", "reference_length", where),
@@ -111,6 +127,10 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
     return made
 
 
+def _name(tree: Mapping[str, Any], key: str, default: str, where: str) -> str:
+    return text_at(tree, key, where, needed="give a name, or leave it out") if key in tree else default
+
+
 def _check_length(made: ImportMapping) -> None:
     """What single keys cannot tell: units that need a reference."""
     where, length = made.where, made.length
@@ -123,8 +143,8 @@ def _check_length(made: ImportMapping) -> None:
             f"{where}: the length column holds {what}, so the reference length has to be "
             "given, for example 'reference_length: 42.8 mm' or --reference-length '42.8 mm'"
         )
-    if made.at_reference is not None and (made.length_is_change or made.half_sarcomere):
-        raise UserError(f"{where}: columns.length.at_reference fits neither changes nor half-sarcomeres; leave it out")
+    if made.at_reference is not None and (made.length_is_change or made.length_of != "fibre"):
+        raise UserError(f"{where}: columns.length.at_reference fits neither changes nor sarcomeres; leave it out")
     if made.reference_length is not None and made.reference_length.kind != "length":
         raise UserError(f"{where}: reference_length has to be a length such as '42.8 mm'")
     if made.servo_give is not None and made.servo_give.kind != length.unit.kind:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.assembly import trial_of
-from xb_muscle_ros.trials.readers.base import Reader
+from xb_muscle_ros.trials.readers.base import Pending, Reader
 from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.readers.force import Force, isometric_force
 from xb_muscle_ros.trials.readers.units import Quantity
@@ -49,13 +49,25 @@ def isometric_f0(folder: Path, suffix: str, reader: Reader, mapping: ImportMappi
 
 
 def _force(file: Path, reader: Reader, mapping: ImportMapping, pca: float) -> float | None:
-    """Initial isometric force of a file's trial; None where it has another pCa or cannot be read."""
+    """Largest initial isometric force of a file's trials at a pCa; None where none has it or can be read."""
+    best: float | None = None
     try:
         found = reader.pca(file, mapping)
-        if found is None or abs(found - pca) > _SAME_PCA:
+        if found is not None and abs(found - pca) > _SAME_PCA:
             return None
-        pending = next(reader.trials(file, mapping))
-        trial = trial_of(pending.read(), mapping, file, isometric_scaling=False)
+        for pending in reader.trials(file, mapping):
+            force = _force_of(pending, file, mapping, pca)
+            best = force if best is None or (force is not None and force > best) else best
     except UserError:  # a broken neighbour is told when its turn comes
+        return best
+    return best
+
+
+def _force_of(pending: Pending, file: Path, mapping: ImportMapping, pca: float) -> float | None:
+    try:
+        trial = trial_of(pending.read(), mapping, file, isometric_scaling=False)
+    except UserError:
+        return None
+    if trial.facts.pca is None or abs(trial.facts.pca - pca) > _SAME_PCA:
         return None
     return isometric_force(Force(trial.force_time_s, trial.force_n), trial.facts.phases)

@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.trials.readers.base import Reader
-from xb_muscle_ros.trials.readers.description import ImportMapping
+from xb_muscle_ros.trials.readers.description import ImportMapping, name_of
 from xb_muscle_ros.trials.readers.mapping import build_mapping
 from xb_muscle_ros.trials.readers.preparation import FoundF0, isometric_f0
 from xb_muscle_ros.trials.readers.registry import READERS, reader_for
 from xb_muscle_ros.trials.readers.tree import merged, subtree, text_at
 
 # Raised when the same file and mapping would make another trial than before.
-VERSION = 1
+VERSION = 2
 # Mappings, and F0 of preparations, that are kept: files come kind by kind and folder by folder.
 _KEPT = 64
 
@@ -88,7 +88,7 @@ class ImportSettings:
             MappingError: the mapping does not fit its format.
         """
         reader = reader_for(path, self._format)
-        matching = tuple(i for i, case in enumerate(self._cases) if case.files.search(path.stem))
+        matching = tuple(i for i, case in enumerate(self._cases) if case.files.search(name_of(path)))
         mapping, digest = self._mapping(reader, matching)
         if mapping.f0_at_pca is not None:
             f0, note = self._f0(path, reader, mapping, digest, mapping.f0_at_pca)
@@ -120,11 +120,20 @@ class ImportSettings:
             told = json.dumps([VERSION, reader.name, self.isometric_scaling, _with_text_keys(tree)], sort_keys=True)
             try:
                 made = build_mapping(tree, self._where, reader.kind)
+                _check_format(made, reader)
             except UserError as problem:
                 raise MappingError(str(problem)) from None
             _make_room(self._mappings)
             self._mappings[key] = made, hashlib.sha256(told.encode()).hexdigest()
         return self._mappings[key]
+
+
+def _check_format(made: ImportMapping, reader: Reader) -> None:
+    """What only tables have."""
+    told = {"columns.trial": made.trial_column, "decimal": made.decimal, "columns.time.rate": made.rate_hz}
+    unused = next((key for key, value in told.items() if value is not None), None)
+    if unused is not None and reader.name != "csv":
+        raise UserError(f"{made.where}: {unused} is for tables (csv), the file is {reader.name}; leave it out")
 
 
 def _with_text_keys(tree: object) -> object:

@@ -13,7 +13,7 @@ import numpy as np
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.trials.readers.base import Pending, begin_of, by_columns
 from xb_muscle_ros.trials.readers.columns import FILE
-from xb_muscle_ros.trials.readers.description import Column, ImportMapping
+from xb_muscle_ros.trials.readers.description import Column, ImportMapping, name_of
 from xb_muscle_ros.trials.readers.recording import Recording, Signal
 from xb_muscle_ros.trials.readers.slc_file import MAGIC, SlcHeader, read_columns, read_header
 from xb_muscle_ros.trials.trial import Array
@@ -96,7 +96,7 @@ def _facts(header: SlcHeader, mapping: ImportMapping) -> dict[str, float | None]
     facts = mapping.facts_of(path)
     if facts["pca"] is not None or mapping.calcium is not None or mapping.activation is not None:
         return facts
-    named = _PCA_IN_NAME.search(path.stem)
+    named = _PCA_IN_NAME.search(name_of(path))
     if named is not None and header.pca is not None and abs(header.pca - int(named.group(1)) / 10) > 0.051:
         raise UserError(
             f"{path}: the header says pCa {header.pca:g}, the file name {int(named.group(1)) / 10:g}; give the right "

@@ -3,29 +3,54 @@
 from __future__ import annotations
 
 import csv
-import math
+import re
+import unicodedata
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.trials.readers.numerals import COMMA, POINT, is_grouped, marks_of, number
+from xb_muscle_ros.trials.readers.text_file import read_text
 from xb_muscle_ros.trials.trial import Array
 
 _DELIMITERS = "\t;,"
+# Excel tells itself the delimiter in a line before the header.
+_SEPARATOR_LINE = re.compile(r"sep=(.)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table as text: ``header`` names the columns, ``rows`` pairs line numbers (from 1) with cells."""
+    """A table as text: ``header`` names the columns, ``rows`` pairs line numbers (from 1) with cells.
+
+    Attributes:
+        path: the file.
+        header: names of the columns, none twice.
+        rows: line number and cells of each row.
+        decimal: `numerals.POINT` or `numerals.COMMA`.
+        told: what was found of encoding and decimal mark, one line each.
+    """
 
     path: Path
     header: tuple[str, ...]
     rows: tuple[tuple[int, tuple[str, ...]], ...]
+    decimal: str = POINT
+    told: tuple[str, ...] = ()
 
     def line(self, row: int) -> int:
         """Line number in the file (from 1) of a row (from 0)."""
         return self.rows[row][0]
+
+    def texts(self, column: str) -> list[str]:
+        """Cells of a column without blanks around them.
+
+        Raises:
+            UserError: no such column.
+        """
+        index = self._index(column)
+        return [cells[index].strip() if index < len(cells) else "" for _, cells in self.rows]
 
     def numbers(self, column: str) -> Array:
         """Values of a column, shape (rows,).
@@ -33,76 +58,120 @@ class Table:
         Raises:
             UserError: no such column, or a cell that is missing or no finite number.
         """
-        if column not in self.header:
-            raise UserError(
-                f"{self.path} has no column '{column}'; its columns: {', '.join(self.header)}"
-                f"{_hint(column, self.header)}"
-            )
-        index = self.header.index(column)
-        texts = [cells[index].strip() if index < len(cells) else "" for _, cells in self.rows]
-        values: Array = np.array([_number(text) for text in texts])
+        texts = self.texts(column)
+        values: Array = np.array([number(text, self.decimal) for text in texts])
         bad = ~np.isfinite(values)
         if bad.any():
-            first = int(np.argmax(bad))
-            run = int(np.argmin(bad[first:])) or bad.size - first
-            found = f"'{texts[first]}'" if texts[first] else "nothing"
-            more = f" (a run of {run} lines)" if run > 1 else ""
-            raise UserError(
-                f"{self.path}, line {self.line(first)}, column '{column}' holds {found}{more}; needed is a finite "
-                "number; mend or remove the line"
-            )
+            self._refuse(column, texts, bad)
         return values
 
+    def _index(self, column: str) -> int:
+        wanted = _plain(column)
+        for i, name in enumerate(self.header):
+            if _plain(name) == wanted:
+                return i
+        hint = suggest(column, self.header)
+        raise UserError(
+            f"{self.path} has no column '{column}'; its columns: {', '.join(self.header)}"
+            f"{hint if 'did you mean' in hint else ''}"
+        )
 
-def read_table(path: Path) -> Table:
+    def _refuse(self, column: str, texts: list[str], bad: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> None:
+        first = int(np.argmax(bad))
+        run = int(np.argmin(bad[first:])) or bad.size - first
+        text = texts[first]
+        more = f" (a run of {run} lines)" if run > 1 else ""
+        if int(bad.sum()) > run:
+            more += f"; so do {int(bad.sum()) - run} further lines"
+        remedy = "needed is a finite number; mend or remove the line"
+        if run > 1 and not text:
+            remedy = "needed is a finite number; remove these lines, or fill them in where the signal is known"
+        elif is_grouped(text):
+            remedy = "thousands separators are not read; export the numbers without them"
+        elif "," in text and self.decimal == POINT:
+            remedy = "if that is a decimal comma, give --decimal comma; else mend or remove the line"
+        found = f"'{text}'" if text else "nothing"
+        raise UserError(f"{self.path}, line {self.line(first)}, column '{column}' holds {found}{more}; {remedy}")
+
+
+def read_table(path: Path, decimal: str | None = None) -> Table:
     """Read delimited text: comma, semicolon or tab, told by the header line; lines that begin with # are comments.
 
+    Args:
+        path: the file.
+        decimal: `numerals.POINT` or `numerals.COMMA`; None for what the cells show.
+
     Raises:
-        UserError: the file is missing, no text, has no header line or no rows.
+        UserError: the file is missing, no text, has no header line or no rows, has rows that are longer than the
+            header, or its decimal mark cannot be told.
     """
     if path.is_dir():
         raise UserError(f"{path} is a folder; give the files themselves, for example {path}/*.csv")
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as problem:
-        raise UserError(f"{path} cannot be read: {problem.strerror}; give a CSV or TSV file") from problem
-    except UnicodeDecodeError:
-        raise UserError(f"{path} is no UTF-8 text; export the recording as CSV or TSV") from None
+    text, encoding = read_text(path)
     lines = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
+    separator = _SEPARATOR_LINE.fullmatch(lines[0][1].strip()) if lines else None
+    if separator is not None:
+        lines = lines[1:]
     if not lines:
         raise UserError(f"{path} is empty; needed are a header line and rows of numbers")
-    delimiter = max(_DELIMITERS, key=lines[0][1].count)
+    delimiter = separator.group(1) if separator is not None else max(_DELIMITERS, key=lines[0][1].count)
     try:
         cells = [next(csv.reader([line], delimiter=delimiter)) for _, line in lines]
     except csv.Error as problem:
         raise UserError(f"{path} is no delimited text ({problem}); export the recording as CSV or TSV") from problem
     header = tuple(name.strip() for name in cells[0])
-    if all(_is_number(name) for name in header):
-        raise UserError(f"{path}, line {lines[0][0]} holds numbers; needed is a header line that names the columns")
-    twice = next((name for name in header if name and header.count(name) > 1), None)
-    if twice is not None:
-        raise UserError(f"{path} has more than one column '{twice}'; rename one")
+    _check_header(path, lines[0][0], header)
     if len(cells) < 2:
         raise UserError(f"{path} has a header line but no rows; needed are rows of numbers")
     rows = tuple((line, tuple(row)) for (line, _), row in zip(lines[1:], cells[1:], strict=True))
-    return Table(path, header, rows)
+    _check_lengths(path, header, rows)
+    mark, told = (decimal, "") if decimal is not None else _decimal(path, rows)
+    return Table(path, header, rows, mark, tuple(line for line in (encoding, told) if line))
 
 
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
+def _check_header(path: Path, line: int, header: tuple[str, ...]) -> None:
+    if all(np.isfinite(number(name)) or np.isfinite(number(name, COMMA)) for name in header):
+        raise UserError(f"{path}, line {line} holds numbers; needed is a header line that names the columns")
+    plain = [_plain(name) for name in header]
+    twice = next((name for name in header if name and plain.count(_plain(name)) > 1), None)
+    if twice is not None:
+        raise UserError(f"{path} has more than one column '{twice}'; rename one")
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+def _check_lengths(path: Path, header: tuple[str, ...], rows: tuple[tuple[int, tuple[str, ...]], ...]) -> None:
+    """Cells beyond the header have shifted others: decimal commas between commas, say."""
+    for line, cells in rows:
+        if any(cell.strip() for cell in cells[len(header) :]):
+            raise UserError(
+                f"{path}, line {line} has {len(cells)} cells, the header {len(header)}; decimal commas need another "
+                "delimiter (semicolon or tab), and every column a name; export it again"
+            )
 
 
-def _hint(column: str, header: tuple[str, ...]) -> str:
-    hint = suggest(column, header)
-    return hint if "did you mean" in hint else ""
+def _decimal(path: Path, rows: tuple[tuple[int, tuple[str, ...]], ...]) -> tuple[str, str]:
+    """The decimal mark the cells show, and a line on it where it is the comma."""
+    found = marks_of(_cells(rows))
+    if found.comma is None:
+        return POINT, ""
+    if found.point is not None:
+        (at, comma), (point_at, point) = found.comma, found.point
+        raise UserError(
+            f"{path}, line {at} holds '{comma}', line {point_at} '{point}': decimal commas and points in one file; "
+            "tell which mark is that of decimals by --decimal comma or --decimal point"
+        )
+    line, text = found.sure or found.comma
+    if found.sure is None:
+        raise UserError(
+            f"{path}, line {line} holds '{text}', which is {text.replace(',', '.')} or {text.replace(',', '')}; tell "
+            "which by --decimal comma, or export the numbers without thousands separators"
+        )
+    return COMMA, f"{path} has decimal commas: '{text}' in line {line} is read as {text.replace(',', '.')}"
+
+
+def _cells(rows: tuple[tuple[int, tuple[str, ...]], ...]) -> Iterator[tuple[int, str]]:
+    return ((line, cell.strip()) for line, cells in rows for cell in cells)
+
+
+def _plain(name: str) -> str:
+    """A column's name as it is compared: the two signs for micro are one."""
+    return unicodedata.normalize("NFKC", name).strip()

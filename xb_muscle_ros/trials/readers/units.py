@@ -10,7 +10,7 @@ from xb_muscle_ros.errors import UserError, suggest
 
 
 class Unit(NamedTuple):
-    """A unit: what it measures and how many of the kind's base unit it is (s, m, L0, N, Pa, F0, µM, V)."""
+    """A unit: what it measures and how many of the kind's base unit it is (s, Hz, m, L0, N, Pa, F0, µM, V)."""
 
     kind: str
     factor: float
@@ -27,6 +27,8 @@ UNITS = {
     "s": Unit("time", 1.0),
     "ms": Unit("time", 1e-3),
     "us": Unit("time", 1e-6),
+    "Hz": Unit("rate", 1.0),
+    "kHz": Unit("rate", 1e3),
     "m": Unit("length", 1.0),
     "cm": Unit("length", 1e-2),
     "mm": Unit("length", 1e-3),
@@ -57,6 +59,7 @@ UNITS = {
 }
 KINDS = {
     "time": ("time",),
+    "rate": ("rate",),
     "length": ("length", "relative length"),
     "force": ("force", "stress", "relative force"),
     "calcium": ("calcium", "pCa"),
