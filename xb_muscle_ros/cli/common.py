@@ -34,11 +34,16 @@ def add_fibre(parser: argparse.ArgumentParser, required: bool = True) -> None:
 
 
 def fibre_of(arguments: argparse.Namespace) -> Fibre:
-    """The fibre that the options pick."""
-    from xb_muscle_ros.models.fibre_file import changed, load_fibre
+    """The fibre that the options pick; says what it lacks of its own, a line each."""
+    from xb_muscle_ros.models.catalogue import without_effect_line
+    from xb_muscle_ros.models.fibre_file import borrowed_line, changed, load_fibre
 
     fibre = load_fibre(arguments.fiber, arguments.model, arguments.method)
-    return changed(fibre, dict(arguments.changes), "--set")
+    fibre = changed(fibre, dict(arguments.changes), "--set")
+    for line in (borrowed_line(fibre), without_effect_line(fibre.model, fibre.values)):
+        if line:
+            warn(line)
+    return fibre
 
 
 def _change(text: str) -> tuple[str, float]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit import features
 from xb_muscle_ros.fit.coordinates import Coordinate, from_json, to_json
 from xb_muscle_ros.fit.correction import Correction
@@ -76,7 +77,7 @@ class Problem:
         """The fibre's force at the samples of trials, F0, before the recording's faults.
 
         Raises:
-            UserError, StateViolation: see `Muscle.settle` and `Muscle.run`.
+            UserError: see `Muscle.settle` and `Muscle.run`; begins with the trial's name.
         """
         settled: dict[tuple[float, float], Array] = {}
         found = []
@@ -86,9 +87,12 @@ class Problem:
             calcium = given_calcium(trial.calcium_um, faults)
             # Trials that begin alike settle alike, which on a strain grid is most of the work.
             begin = (float(length[0]), float(calcium[0]))
-            if begin not in settled:
-                settled[begin] = muscle.settle(*begin)
-            states = muscle.run(settled[begin], trial.dt_s, length, calcium)
+            try:
+                if begin not in settled:
+                    settled[begin] = muscle.settle(*begin)
+                states = muscle.run(settled[begin], trial.dt_s, length, calcium)
+            except UserError as error:
+                raise UserError(f"trial {trial.name}: {error}") from error
             force = muscle.outputs_of(states)["force_f0"]
             found.append(force if self.correction is None else force + self.correction.of_trial(trial.name, z))
         return found
@@ -102,7 +106,7 @@ class Problem:
         """Recorded force of trials (default: all) at a point, F0.
 
         Raises:
-            UserError, StateViolation: see `true_forces`.
+            UserError: see `true_forces`.
         """
         chosen = self.trials if trials is None else trials
         forces = self.true_forces(Muscle(self.fibre_at(z)), z, chosen)
@@ -125,7 +129,7 @@ class Problem:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, so that a worker elsewhere can have it."""
-        fibre = {**self.fibre.__dict__, "values": dict(self.fibre.values), "path": None}
+        fibre = {**self.fibre.__dict__, "values": dict(self.fibre.values), "path": None, "starts": {}}
         return {
             "fibre": {**fibre, "available_models": list(self.fibre.available_models)},
             "trials": [trial.to_json() for trial in self.trials],
