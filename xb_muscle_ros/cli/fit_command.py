@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xb_muscle_ros.cli.common import add_fibre, add_work, warn, work_options_of
+from xb_muscle_ros.cli.common import add_fibre, add_work, fibre_of, warn, work_options_of
 from xb_muscle_ros.errors import UserError
 
 if TYPE_CHECKING:
@@ -95,8 +95,9 @@ def run(arguments: argparse.Namespace) -> int:
         raise UserError(f"{out} exists; use --overwrite to replace it or choose another name for --out")
     if not 0.5 <= arguments.level < 1.0:
         raise UserError(f"--level is {arguments.level:g}; allowed is 0.5 up to below 1")
+    fibre = fibre_of(arguments, for_fit=True)
     trials = _trials(arguments)
-    problem, notes = _problem(arguments, trials)
+    problem, notes = _problem(arguments, fibre, trials)
     for line in notes:
         warn(line)
     folder = out.with_suffix("")
@@ -146,7 +147,7 @@ def _trials(arguments: argparse.Namespace) -> list[Trial]:
     return trials
 
 
-def _problem(arguments: argparse.Namespace, trials: list[Trial]) -> tuple[Problem, list[str]]:
+def _problem(arguments: argparse.Namespace, given: Fibre, trials: list[Trial]) -> tuple[Problem, list[str]]:
     """The problem, and lines on what was taken for granted."""
     from xb_muscle_ros.fit.coordinates import fault_coordinates, free_names, parameter_coordinates, population_choices
     from xb_muscle_ros.fit.data import fit_trials
@@ -158,7 +159,7 @@ def _problem(arguments: argparse.Namespace, trials: list[Trial]) -> tuple[Proble
 
     facts = [t.facts for t in trials]
     ties = dict(_pairs(arguments.tie, "--tie"))
-    fibre, notes = _fibre(arguments, trials, ties)
+    fibre, notes = _start(arguments, given, trials, ties)
     out = held_out(facts, arguments.hold_out, arguments.train, arguments.split)
     if arguments.split and not any(out):
         notes.append(f"--split {arguments.split} holds none of the trials out: all of them are fitted")
@@ -183,21 +184,17 @@ def _problem(arguments: argparse.Namespace, trials: list[Trial]) -> tuple[Proble
     return Problem(fibre, prepared, coordinates, ties, features), [*start_lines(fibre), *notes]
 
 
-def _fibre(arguments: argparse.Namespace, trials: list[Trial], ties: dict[str, str]) -> tuple[Fibre, list[str]]:
-    """The fibre to start from, with name and constants of the one that was measured."""
+def _start(
+    arguments: argparse.Namespace, given: Fibre, trials: list[Trial], ties: dict[str, str]
+) -> tuple[Fibre, list[str]]:
+    """The fibre to start from, with name and constants of the one that was measured, and lines on these."""
     from dataclasses import replace
 
     from xb_muscle_ros.fit.start import begun, with_constants
-    from xb_muscle_ros.models.fibre_file import borrowed_line, changed, load_fibre
 
-    changes = dict(arguments.changes)
-    fibre = load_fibre(arguments.fiber, arguments.model, arguments.method, for_fit=True)
-    fibre = changed(fibre, changes, "--set")
-    borrowed = borrowed_line(fibre)
-    fibre = begun(fibre, arguments.free, arguments.fix, ties, changes)
-    fibre, differing = with_constants(fibre, [t.facts for t in trials])
-    name = trials[0].facts.fibre if trials else arguments.features_of
-    return replace(fibre, name=name), [*([borrowed] if borrowed else []), *differing]
+    fibre = begun(given, arguments.free, arguments.fix, ties, dict(arguments.changes))
+    fibre, lines = with_constants(fibre, [t.facts for t in trials])
+    return replace(fibre, name=trials[0].facts.fibre if trials else arguments.features_of), lines
 
 
 def _nuisances(given: list[str]) -> tuple[list[str], dict[str, float]]:
