@@ -107,7 +107,8 @@ def _start(axes: Any, start: float, low: float, high: float) -> Any:
     place, side = (1.0, "right") if right else (0.0, "left")
     axes.plot([place], [0.0], marker=marker, markersize=6, clip_on=False, zorder=4, transform=transform, **style)
     axes.annotate(
-        f"{start:.3g}", (place, 0.0), xycoords=transform, xytext=(-6 if right else 6, 3), textcoords="offset points",
+        short_number(float(f"{start:.3g}")),
+        (place, 0.0), xycoords=transform, xytext=(-6 if right else 6, 3), textcoords="offset points",
         ha=side, va="bottom", fontsize=6.5, color="black", zorder=5,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5},
     )  # fmt: skip
