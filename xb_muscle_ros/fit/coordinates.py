@@ -20,23 +20,9 @@ Array = npt.NDArray[np.float64]
 
 # What the paper fitted, over all its models (van der Zee et al. 2026, "Fitted model parameters").
 FITTED = (
-    "f",
-    "k11",
-    "k21",
-    "k22",
-    "dLcrit",
-    "kon",
-    "koop",
-    "kappa",
-    "n",
-    "JF",
-    "vmax",
-    "act_max",
-    "kse",
-    "kse0",
-    "kpe",
-    "Fpe0",
-)
+    "f", "k11", "k21", "k22", "dLcrit", "kon", "koop", "kappa", "n", "JF", "vmax", "act_max",
+    "kse", "kse0", "kpe", "Fpe0",
+)  # fmt: skip
 # How far a fit may go from its start where nothing else is said: a factor either way.
 REACH = 100.0
 # Default prior on a logarithmic scale: two thirds within a factor of e of the start, as wide as the released sets of
@@ -190,8 +176,11 @@ def _parameter(fibre: Fibre, name: str, owner: Entry | None, choice: Choice) -> 
     made = _of_mechanism(owner, name, start) if owner is not None and ours else _of_paper(name, start)
     log = made.log
     starts = fibre.starts.get(name, (start,))
-    lower = min(made.lower, *starts) if choice.lower is None else choice.lower
-    upper = max(made.upper, *starts) if choice.upper is None else choice.upper
+    # A value beyond the usual reach has the table's range to move in.
+    lower = made.lower if made.lower <= min(starts) else max(row.lower, 1e-12) if log else row.lower
+    upper = made.upper if made.upper >= max(starts) else row.upper
+    lower = lower if choice.lower is None else choice.lower
+    upper = upper if choice.upper is None else choice.upper
     where = f"parameter '{name}'"
     if not row.lower <= lower < upper <= row.upper:
         raise UserError(

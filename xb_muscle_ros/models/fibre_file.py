@@ -132,7 +132,8 @@ def changed(fibre: Fibre, changes: Mapping[str, object], where: str) -> Fibre:
                 f"{suggest(name, values)}"
             )
         values[name] = checked(name, value, PARAMETERS, where)
-    return replace(fibre, values=MappingProxyType(values))
+    starts = MappingProxyType({name: tried for name, tried in fibre.starts.items() if name not in changes})
+    return replace(fibre, values=MappingProxyType(values), starts=starts)
 
 
 def _flatten(tree: Mapping[object, object], prefix: str) -> Iterator[tuple[str, object]]:
