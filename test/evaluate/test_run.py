@@ -334,7 +334,7 @@ def test_the_one_file_given_serves_a_fibre_nobody_knows(make: Maker, tmp_path: P
     assert results.sections["force_rmsd"]["overall"]["2state"]["whole"]["mean"] == pytest.approx(0.01, abs=1e-6)
     assert results.sections["trials"]["fibres"] == ["mine"]
     served = [line for line in results.warnings if "mine" in line]
-    assert served == ["trials of fibre mine are compared with parameters of 18Dec2017a, given alone"]
+    assert served == ["trials of fibre mine are compared with parameters of 18Dec2017a, the one file given"]
 
 
 def test_a_mechanism_at_its_null_is_said(make: Maker, tmp_path: Path) -> None:
