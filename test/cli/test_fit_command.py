@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from xb_muscle_ros.cli.main import main
+from xb_muscle_ros.fit.coordinates import FITTED
 from xb_muscle_ros.models.fibre_file import load_fibre
 
 QUICK = ["--free", "f", "k21", "--starts", "1", "--no-intervals", "--processes", "0"]
@@ -121,3 +122,79 @@ def test_nothing_to_fit_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert "nothing to fit to" in capsys.readouterr().err
     assert main(["fit", "--fiber", "18Dec2017a", "--out", str(tmp_path / "x.txt")]) == 2
     assert "ending in .yaml" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def own_bags(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Bags of a fibre of the user's own, 30 mm long and of 0.4 N, with some drag."""
+    from dataclasses import replace
+
+    from xb_muscle_ros.models.fibre_file import changed
+    from xb_muscle_ros.models.muscle import Muscle
+    from xb_muscle_ros.replay.offline import simulate_trial
+    from xb_muscle_ros.trials.bags import write_trial
+    from xb_muscle_ros.trials.protocol import StretchShortenStretch
+
+    out = tmp_path_factory.mktemp("own")
+    muscle = Muscle(
+        changed(load_fibre("18Dec2017a", "3state_coop+viscous_drag"), {"drag": 0.03, "smoothing": 0.0}, "test")
+    )
+    for pca in (4.5, 6.1):
+        trial = StretchShortenStretch(0.0383, 0.1).trial("mine", pca)
+        facts = replace(trial.facts, reference_length_m=0.03, f0_n=0.4)
+        trial = replace(trial, facts=facts, length_m=0.03 * trial.length_m)
+        force = simulate_trial(muscle, trial).force_n
+        write_trial(out / trial.facts.trial, replace(trial, force_time_s=trial.time_s, force_n=force))
+    return str(out)
+
+
+DRAG = ["--model", "3state_coop+viscous_drag", "--starts", "1", "--no-intervals", "--processes", "0"]
+
+
+def test_a_mechanism_is_fitted_without_being_named_and_the_file_serves_the_bags(
+    own_bags: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "mine.yaml"
+    fixed = [n for n in FITTED if n in load_fibre("18Dec2017a", "3state_coop").values and n != "f"]
+    assert main([*fit(own_bags, out), *DRAG, "--fix", *fixed]) == 0
+    said = capsys.readouterr()
+    assert "viscous_drag has no fitted values in the fibre file; starts from the catalogue's: drag 0.01" in said.err
+    assert "held at their values: kon " in said.out
+    fibre = load_fibre(out)
+    assert fibre.values["drag"] == pytest.approx(0.03, rel=0.02)
+    assert (fibre.name, fibre.reference_length_m, fibre.f0_n) == ("mine", 0.03, 0.4)
+    found = json.loads((tmp_path / "mine" / "fit.json").read_text())
+    assert found["held"]["koff"] == 80.0
+    assert found["fibre"] == "mine"
+    # Every command takes the file for the bags it was fitted to, and none has anything to remark.
+    arguments = ["evaluate", own_bags, "--fiber", str(out), "--processes", "0", "--out", str(tmp_path / "e")]
+    assert main(arguments) == 0
+    assert "xb_muscle: " not in capsys.readouterr().err
+
+
+def test_a_mechanism_left_at_its_null_is_said(
+    own_bags: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*fit(own_bags, tmp_path / "x.yaml"), *DRAG, "--free", "f"]) == 0
+    line = "xb_muscle: warning: viscous_drag is at its null value (drag 0) and not fitted, its effect is exactly zero"
+    assert capsys.readouterr().err.count(line) == 1
+    given = ["simulate", "--fiber", "18Dec2017a", "--model", "3state_coop+viscous_drag", "--set", "smoothing=0"]
+    assert main([*given, "--out", str(tmp_path / "b")]) == 0
+    line = "viscous_drag is at its null value, its effect is exactly zero; fit it or give --set drag=VALUE\n"
+    assert capsys.readouterr().err.count(line) == 1
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--free", "f", "--bound", "k21=1:2"], "parameter 'k21' has a bound or prior but is not fitted"),
+        (["--bound", "f=1:200", "--bound", "f=1:2", "f=3:200"], "--bound f is given more than once"),
+        (["--nuisance", "all=0.1"], "'all' takes no SD"),
+        (["--hold-out", "pca=9"], "no trial meets the rule 'pca=9'"),
+    ],
+)
+def test_what_would_have_been_passed_over(
+    bags: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], words: str
+) -> None:
+    assert main(fit(bags, tmp_path / "x.yaml", "--processes", "0", *more)) == 2
+    assert words in capsys.readouterr().err

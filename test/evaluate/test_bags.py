@@ -71,6 +71,23 @@ def test_a_bag_of_a_fibre_that_was_not_given(make: Maker, repo_root: Path) -> No
     )
 
 
+def test_a_bag_of_a_fibre_nobody_knows_takes_the_one_file_given(
+    make: Maker, recorded: Callable[..., Trial], repo_root: Path
+) -> None:
+    """As a replay does; with two files there is nothing to choose by."""
+    trial = recorded()
+    path = make(replace(trial, facts=replace(trial.facts, fibre="mine")))
+    folder = repo_root / "config" / "fibers"
+    files = {name: folder / f"{name}.yaml" for name in ("18Dec2017a", "13Dec2017a")}
+    (task,) = bags.tasks([path], {"18Dec2017a": files["18Dec2017a"]}, ["3state_coop"], None)
+    found = bags.evaluate_bag(task)
+    assert found["trial"]["fibre"] == "mine"
+    assert found["models"]["3state_coop"]["rmsd_f0"]["whole"] == pytest.approx(0.02, abs=1e-6)
+    for given in (files, None):
+        (task,) = bags.tasks([path], given, ["3state_coop"], None)
+        assert bags.evaluate_bag(task)["unserved"] == "mine"
+
+
 def test_nan_in_a_bag_is_told_with_topic_and_time(make: Maker, recorded: Callable[..., Trial]) -> None:
     path = make()
     _poison(path)

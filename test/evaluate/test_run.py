@@ -10,6 +10,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,10 @@ import pytest
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.evaluate.run import JOURNAL, Request, draw_figures, evaluate, write, write_tables
+from xb_muscle_ros.models.fibre_file import load_fibre
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.trial import Trial
 from xb_muscle_ros.work import Options
 
@@ -306,3 +311,37 @@ def _kill_a_worker_at(cluster: Any, out: Path, count: int) -> _Killer:
     killer = _Killer(pid, out, count)
     killer.start()
     return killer
+
+
+def mine(make: Maker, count: int) -> Path:
+    """Bags of a fibre that no file is known of."""
+    for k in range(count):
+        trial = StretchShortenStretch(0.0383, 0.1).trial("mine", 6.1 + 0.1 * k, 500.0)
+        force = simulate_trial(Muscle(load_fibre("18Dec2017a", "2state")), trial).force_n
+        path = make(replace(trial, force_time_s=trial.time_s, force_n=force + 0.01))
+    return path.parent
+
+
+def test_a_fibre_nobody_knows_is_one_line_however_many_bags(make: Maker, tmp_path: Path) -> None:
+    folder = mine(make, 3)
+    with pytest.raises(UserError, match=r"^3 bags, from .* to .*: fibre 'mine' is not known.* --fiber$"):
+        evaluate(request(tmp_path / "out", folder))
+
+
+def test_the_one_file_given_serves_a_fibre_nobody_knows(make: Maker, tmp_path: Path) -> None:
+    folder = mine(make, 2)
+    results = evaluate(request(tmp_path / "out", folder, fibres=("18Dec2017a",), models=("2state",)))
+    assert results.sections["force_rmsd"]["overall"]["2state"]["whole"]["mean"] == pytest.approx(0.01, abs=1e-6)
+    assert results.sections["trials"]["fibres"] == ["mine"]
+    served = [line for line in results.warnings if "mine" in line]
+    assert served == ["trials of fibre mine are compared with parameters of 18Dec2017a, the one file given"]
+
+
+def test_a_mechanism_at_its_null_is_said(make: Maker, tmp_path: Path) -> None:
+    make()
+    results = evaluate(request(tmp_path / "out", tmp_path / "bags", models=("3state_coop+viscous_drag",)))
+    (line,) = [line for line in results.warnings if "drag" in line]
+    assert line == (
+        "model 3state_coop+viscous_drag, fibre 18Dec2017a: viscous_drag is at its null value, its effect is exactly "
+        "zero; fit it first"
+    )

@@ -18,7 +18,7 @@ from xb_muscle_ros.fit.features import F0_ANCHOR
 from xb_muscle_ros.fit.methods import corrected, difference, fast_form
 from xb_muscle_ros.fit.noise import FIRST, Scale
 from xb_muscle_ros.fit.problem import Problem
-from xb_muscle_ros.fit.report import as_json, warnings
+from xb_muscle_ros.fit.report import as_json
 from xb_muscle_ros.fit.run import Fitted, Settings, fit
 from xb_muscle_ros.fit.solve import Objective, descend
 from xb_muscle_ros.fit.training import Training
@@ -58,6 +58,11 @@ def grid_problem(grid_start: Fibre, grid_truth: Fibre) -> Problem:
 @pytest.fixture(scope="module")
 def grid_fitted(grid_problem: Problem) -> Fitted:
     return fit(grid_problem, Settings(starts=1), HERE)
+
+
+def warned(fitted: Fitted) -> list[str]:
+    """Lines that the fit warns with."""
+    return list(as_json(fitted, {})["warnings"])
 
 
 def full(problem: Problem) -> Problem:
@@ -167,12 +172,12 @@ def test_interrupted_grid_fit_goes_on_where_it_was(
 
 def test_bins_wider_than_attachment_are_told(grid_problem: Problem, grid_fitted: Fitted) -> None:
     coarse = replace(grid_problem, fibre=changed(grid_problem.fibre, {"bins": 101.0}, "test"))
-    line = next(line for line in warnings(replace(grid_fitted, problem=coarse)) if "bins" in line)
+    line = next(line for line in warned(replace(grid_fitted, problem=coarse)) if "bins" in line)
     assert "use --set bins=145 or more" in line
 
 
 def test_a_fit_that_did_not_settle_is_told(grid_fitted: Fitted) -> None:
-    assert any("did not settle" in line for line in warnings(replace(grid_fitted, method_settled=False)))
+    assert any("did not settle" in line for line in warned(replace(grid_fitted, method_settled=False)))
 
 
 def test_where_the_grid_has_no_solution_a_fit_says_so(grid_problem: Problem) -> None:

@@ -15,7 +15,7 @@ from xb_muscle_ros.fit import run as fit_run
 from xb_muscle_ros.fit.coordinates import Choice, fault_coordinates, parameter_coordinates
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.problem import Problem
-from xb_muscle_ros.fit.report import as_json, mean_rmsd, table, warnings, write_fitted
+from xb_muscle_ros.fit.report import as_json, mean_rmsd, table, write_fitted
 from xb_muscle_ros.fit.run import Fitted, Settings, fit
 from xb_muscle_ros.models.fibre_file import Fibre, load_fibre
 from xb_muscle_ros.trials.trial import Trial
@@ -24,6 +24,11 @@ from xb_muscle_ros.work import Options
 Maker = Callable[..., list[Trial]]
 HERE = Options(processes=0, quiet=True)
 PROVENANCE = {"fibre_of_trials": "made", "start": "test", "json": "fit.json"}
+
+
+def warned(fitted: Fitted) -> list[str]:
+    """Lines that the fit warns with."""
+    return list(as_json(fitted, PROVENANCE)["warnings"])
 
 
 @pytest.fixture(scope="module")
@@ -113,14 +118,14 @@ def test_what_the_data_do_not_see_is_called_so(start: Fibre, made_trials: Maker)
     choices = {"kon": Choice(prior_sd=float("inf"), lower=10.0, upper=400.0)}
     coordinates = parameter_coordinates(start, ["f", "k21", "kon"], (), {}, choices)
     found = fit(Problem(start, trials, coordinates, {}), Settings(1), HERE)
-    assert any(line.startswith("kon is not identifiable") for line in warnings(found))
+    assert any(line.startswith("kon is not identifiable") for line in warned(found))
 
 
 def test_a_value_at_its_bound_is_told(start: Fibre, made_trials: Maker) -> None:
     trials = fit_trials(made_trials((4.5,)), [False])
     coordinates = parameter_coordinates(start, ["f"], (), {}, {"f": Choice(lower=70.0, upper=85.0)})
     found = fit(Problem(start, trials, coordinates, {}), Settings(1, level=None), HERE)
-    assert any(line.startswith("f is at its upper bound, 85") for line in warnings(found))
+    assert any(line.startswith("f is at its upper bound, 85") for line in warned(found))
 
 
 def test_ties_move_together(start: Fibre, made_trials: Maker) -> None:
@@ -166,7 +171,7 @@ def test_a_random_start_without_a_solution_is_left_out(problem: Problem, monkeyp
     found = fit(problem, Settings(2, level=None), HERE)
     assert found.starts[0] is not None
     assert found.starts[1] is None
-    assert any("1 of 2 starts led nowhere" in line for line in warnings(found))
+    assert any("1 of 2 starts led nowhere" in line for line in warned(found))
 
 
 def test_number_of_starts(problem: Problem) -> None:

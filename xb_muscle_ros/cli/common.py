@@ -35,12 +35,22 @@ def add_fibre(parser: argparse.ArgumentParser, required: bool = True) -> None:
     )
 
 
-def fibre_of(arguments: argparse.Namespace) -> Fibre:
-    """The fibre that the options pick."""
-    from xb_muscle_ros.models.fibre_file import changed, load_fibre
+def fibre_of(arguments: argparse.Namespace, for_fit: bool = False) -> Fibre:
+    """The fibre that the options pick; says what it lacks of its own, a line each.
 
-    fibre = load_fibre(arguments.fiber, arguments.model, arguments.method)
-    return changed(fibre, dict(arguments.changes), "--set")
+    Args:
+        arguments: parsed.
+        for_fit: what it lacks is to be fitted, see `load_fibre`.
+    """
+    from xb_muscle_ros.models.catalogue import without_effect_line
+    from xb_muscle_ros.models.fibre_file import borrowed_line, changed, load_fibre
+
+    fibre = load_fibre(arguments.fiber, arguments.model, arguments.method, for_fit)
+    fibre = changed(fibre, dict(arguments.changes), "--set")
+    for line in (borrowed_line(fibre), "" if for_fit else without_effect_line(fibre.model, fibre.values)):
+        if line:
+            warn(line)
+    return fibre
 
 
 def add_reading(parser: argparse.ArgumentParser, several: bool = False) -> None:

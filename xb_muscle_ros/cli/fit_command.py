@@ -22,6 +22,7 @@ from xb_muscle_ros.files import matching, refuse_older
 if TYPE_CHECKING:
     from xb_muscle_ros.fit.coordinates import Choice
     from xb_muscle_ros.fit.problem import Problem
+    from xb_muscle_ros.models.fibre_file import Fibre
     from xb_muscle_ros.trials.trial import Trial
 
     Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -52,7 +53,12 @@ def add(subparsers: Subparsers) -> None:
         "--window", choices=("paper", "whole"), default="paper", help="force that counts (default: paper)"
     )
     parser.add_argument("--weight", nargs="+", default=[], metavar="TRIAL=W", help="weights of trials (default: 1)")
-    parser.add_argument("--free", nargs="+", metavar="NAME", help="parameters to fit (default: those the paper fitted)")
+    parser.add_argument(
+        "--free",
+        nargs="+",
+        metavar="NAME",
+        help="parameters to fit (default: those the paper fitted, and those of mechanisms)",
+    )
     parser.add_argument("--fix", nargs="+", default=[], metavar="NAME", help="parameters that keep their start value")
     parser.add_argument("--tie", nargs="+", default=[], metavar="A=B", help="parameter A takes the value of B")
     parser.add_argument("--bound", nargs="+", default=[], metavar="NAME=LO:HI", help="bounds of parameters")
@@ -104,20 +110,22 @@ def run(arguments: argparse.Namespace) -> int:
     refuse_older(older, arguments.overwrite)
     if not 0.5 <= arguments.level < 1.0:
         raise UserError(f"--level is {arguments.level:g}; allowed is 0.5 up to below 1")
-    trials = _trials(arguments)
-    problem = _problem(arguments, trials)
-    fibre_of_trials = trials[0].facts.fibre if trials else arguments.features_of
+    fibre = fibre_of(arguments, for_fit=True)
+    trials = _trials(arguments, fibre)
+    problem, notes = _problem(arguments, fibre, trials)
+    for line in notes:
+        warn(line)
     settings = Settings(arguments.starts, arguments.seed, None if arguments.no_intervals else arguments.level)
     fitted = fit(problem, settings, work_options_of(arguments, journal=folder / "journal.jsonl"))
     provenance = {
         "bags": [str(bag) for bag in arguments.bags],
-        "fibre_of_trials": fibre_of_trials,
+        "fibre_of_trials": problem.fibre.name,
         "features": str(arguments.features) if arguments.features else None,
         "start": str(arguments.fiber),
         "split": {"hold_out": arguments.hold_out, "train": arguments.train, "preset": arguments.split},
         "json": f"{folder.name}/fit.json",
     }
-    found = as_json(fitted, provenance)
+    found = as_json(fitted, provenance, notes)
     print(table(found))
     for line in found["warnings"]:
         warn(line)
@@ -137,53 +145,79 @@ def _figures(folder: Path, fitted: Any, found: dict[str, Any]) -> list[Path]:
     return draw(folder, fitted, found)
 
 
-def _trials(arguments: argparse.Namespace) -> list[Trial]:
+def _trials(arguments: argparse.Namespace, fibre: Fibre) -> list[Trial]:
     if not arguments.bags and arguments.features is None:
         raise UserError("nothing to fit to; give bags of trials, or --features")
     if not arguments.bags and arguments.features_of is None:
         raise UserError("without bags nobody knows whose features to fit; give --features-of")
-    trials = study_of(arguments, fibre_of(arguments)).trials if arguments.bags else []
+    trials = study_of(arguments, fibre).trials if arguments.bags else []
     fibres = dict.fromkeys(trial.facts.fibre for trial in trials)
     if len(fibres) > 1:
         raise UserError(f"trials are of fibres {', '.join(fibres)}; fit one fibre at a time")
     return trials
 
 
-def _problem(arguments: argparse.Namespace, trials: list[Trial]) -> Problem:
-    from xb_muscle_ros.fit.coordinates import fault_coordinates, parameter_coordinates, population_choices
+def _problem(arguments: argparse.Namespace, given: Fibre, trials: list[Trial]) -> tuple[Problem, list[str]]:
+    """The problem, and lines on what was taken for granted."""
+    from xb_muscle_ros.fit.coordinates import fault_coordinates, free_names, parameter_coordinates, population_choices
     from xb_muscle_ros.fit.data import fit_trials
     from xb_muscle_ros.fit.features import F0_ANCHOR, Feature, measured
     from xb_muscle_ros.fit.problem import Problem
     from xb_muscle_ros.fit.split import held_out
+    from xb_muscle_ros.fit.start import start_lines
     from xb_muscle_ros.models.fibre_file import load_fibre
 
-    fibre = fibre_of(arguments)
-    out = held_out([t.facts for t in trials], arguments.hold_out, arguments.train, arguments.split)
+    facts = [t.facts for t in trials]
+    ties = dict(_pairs(arguments.tie, "--tie"))
+    fibre, notes = _start(arguments, given, trials, ties)
+    out = held_out(facts, arguments.hold_out, arguments.train, arguments.split)
+    if arguments.split and not any(out):
+        notes.append(f"--split {arguments.split} holds none of the trials out: all of them are fitted")
     weights = {name: _number(value, f"--weight {name}") for name, value in _pairs(arguments.weight, "--weight")}
     prepared = fit_trials(trials, out, arguments.window == "whole", weights)
     training = [t for t in prepared if not t.held_out and t.weight > 0.0]
-    ties = dict(_pairs(arguments.tie, "--tie"))
     names, sds = _nuisances(arguments.nuisance)
     choices = _choices(arguments)
     if arguments.prior_fibers:
-        others = [load_fibre(name, fibre.model) for name in arguments.prior_fibers]
-        choices = population_choices(others, choices)
+        others = [load_fibre(name, fibre.model, for_fit=True) for name in arguments.prior_fibers]
+        free = free_names(fibre, arguments.free, arguments.fix, ties)
+        mine, choices = set(choices), population_choices(others, choices, free)
+        default = [name for name in free if name not in choices and name not in mine]
+        if default:
+            notes.append(f"--prior-fibers says nothing of {', '.join(default)}: default priors")
     coordinates = parameter_coordinates(fibre, arguments.free, arguments.fix, ties, choices)
     coordinates += fault_coordinates(names, [t.name for t in training], [t.solution for t in training], sds)
     features: tuple[Feature, ...] = () if arguments.no_anchor else (F0_ANCHOR,)
     if arguments.features is not None:
-        whose = arguments.features_of or trials[0].facts.fibre
-        features += measured(arguments.features, whose, not arguments.force_pca_only)
-    return Problem(fibre, prepared, coordinates, ties, features)
+        whose = arguments.features_of or fibre.name
+        features += measured(arguments.features, whose, not arguments.force_pca_only, notes.append)
+    return Problem(fibre, prepared, coordinates, ties, features), [*start_lines(fibre), *notes]
+
+
+def _start(
+    arguments: argparse.Namespace, given: Fibre, trials: list[Trial], ties: dict[str, str]
+) -> tuple[Fibre, list[str]]:
+    """The fibre to start from, with name and constants of the one that was measured, and lines on these."""
+    from dataclasses import replace
+
+    from xb_muscle_ros.fit.start import begun, with_constants
+
+    fibre = begun(given, arguments.free, arguments.fix, ties, dict(arguments.changes))
+    fibre, lines = with_constants(fibre, [t.facts for t in trials])
+    return replace(fibre, name=trials[0].facts.fibre if trials else arguments.features_of), lines
 
 
 def _nuisances(given: list[str]) -> tuple[list[str], dict[str, float]]:
     from xb_muscle_ros.measurement.faults import FAULTS
 
     names: list[str] = []
-    sds = {}
+    sds: dict[str, float] = {}
     for text in given:
         name, equals, sd = text.partition("=")
+        if name == "all" and equals:
+            raise UserError(f"--nuisance {text}: 'all' takes no SD, since each has its own unit; name them one by one")
+        if name in sds:
+            raise UserError(f"--nuisance {name} is given an SD twice; give it once")
         names += list(FAULTS) if name == "all" else [name]
         if equals:
             sds[name] = _number(sd, f"--nuisance {name}")
@@ -210,6 +244,8 @@ def _pairs(given: list[str], option: str) -> list[tuple[str, str]]:
     for text, (name, _, value) in zip(given, pairs, strict=True):
         if not name or not value:
             raise UserError(f"{option} {text}: needed is NAME=VALUE")
+        if sum(other == name for other, _, _ in pairs) > 1:
+            raise UserError(f"{option} {name} is given more than once; give it once")
     return [(name, value) for name, _, value in pairs]
 
 

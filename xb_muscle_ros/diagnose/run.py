@@ -28,6 +28,7 @@ from xb_muscle_ros.diagnose.study import Explanation, Study
 from xb_muscle_ros.diagnose.verdict import Decision, Evidence, decide, explained
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.data import fit_trials
+from xb_muscle_ros.fit.start import with_constants
 from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
 from xb_muscle_ros.trials.completing import Known
 from xb_muscle_ros.trials.study import read_study
@@ -97,6 +98,9 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
     warnings = [w for t in trials for w in t.warnings]
     # Released sets were fitted with smooth functions; what they blur is no physics to be looked for.
     fibre = changed(fibre, {"smoothing": 0.0}, "diagnosis")
+    # What is written carries the rest length and F0 of what was measured.
+    fibre, differing = with_constants(fibre, [t.facts for t in trials])
+    warnings += differing
     study = Study(fibre, fit_trials(trials, [False] * len(trials), whole=True))
     recordings = Recordings.of(trials, effort.draws, seed)
     start = Fit(Explanation(), {}, np.inf, np.inf, 0)

@@ -13,7 +13,8 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.evaluate.checks import check_trial
-from xb_muscle_ros.models.fibre_file import Fibre, base_set, fibre_folders, find_fibre_file, load_fibre
+from xb_muscle_ros.evaluate.sets import NoFibreFile, file_serving
+from xb_muscle_ros.models.fibre_file import Fibre, base_set, fibre_folders, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.offline import simulate_trial
 from xb_muscle_ros.scores.conditions import nominal
@@ -103,9 +104,9 @@ def evaluate_bag(task: Mapping[str, Any]) -> Found:
 
     Returns:
         ``bag``; then ``several``: the fibres of a bag that has more than one, where the task does not choose; or
-        ``problem``: one line; or ``warnings``, ``trial`` (facts), ``measured`` and ``models``: what `answer` says of
-        each force, models with ``rmsd_f0`` as well; ``missing``: models without parameter set; ``notes``: lines on
-        facts that are not the bag's own.
+        ``problem``: one line, and ``unserved``: its fibre, where no file serves that; or ``warnings``, ``trial``
+        (facts), ``measured`` and ``models``: what `answer` says of each force, models with ``rmsd_f0`` as well;
+        ``missing``: models without parameter set; ``notes``: lines on facts that are not the bag's own.
     """
     label = f"{task['bag']}, fibre {task['fibre']}" if "fibre" in task else task["bag"]
     found: Found = {"bag": label}
@@ -128,7 +129,7 @@ def evaluate_bag(task: Mapping[str, Any]) -> Found:
         }
         if task["measured_only"]:
             return found
-        path = _fibre_path(task["fibres"], trial.facts.fibre)
+        path = file_serving(task["fibres"], trial.facts.fibre)
         for name in task["models"] or _available(str(path), task["fibre_files"]):
             muscle = _muscle(str(path), name, task["method"], task["fibre_files"])
             if muscle is None:
@@ -137,7 +138,9 @@ def evaluate_bag(task: Mapping[str, Any]) -> Found:
                 found["models"][name] = _compared(trial, muscle, task["settle_s"])
     except UserError as error:
         text = str(error).replace(task["path"], task["bag"])
-        return {"bag": label, "problem": text if task["bag"] in text else f"bag {task['bag']}: {text}"}
+        unserved = {"unserved": error.fibre} if isinstance(error, NoFibreFile) else {}
+        problem = text if task["bag"] in text else f"bag {task['bag']}: {text}"
+        return {"bag": label, "problem": problem, **unserved}
     return found
 
 
@@ -191,7 +194,7 @@ def evaluate_enhancement(task: Mapping[str, Any]) -> Found:
     )
     if task["measured_only"]:
         return found
-    path = _fibre_path(task["fibres"], stretched.facts.fibre)
+    path = file_serving(task["fibres"], stretched.facts.fibre)
     for name in task["models"] or _available(str(path), task["fibre_files"]):
         muscle = _muscle(str(path), name, task["method"], task["fibre_files"])
         if muscle is not None:
@@ -211,7 +214,7 @@ def _trial(bag: TrialBag, task: Mapping[str, Any]) -> tuple[Trial, tuple[str, ..
         raise UserError(f"the bag's fibre is '{told}'; --trials-of takes those of '{only}' alone")
     known = Known(**task["known"])
     if not task["measured_only"]:
-        path = _fibre_path(task["fibres"], told)
+        path = file_serving(task["fibres"], told)
         known = known.of_file(_fibre(str(path), task["fibre_files"]))
     return trial_of_bag(bag, name, known, task["bag"] if "bag" in task else str(bag.path))
 
@@ -276,16 +279,6 @@ def _redeveloped(trial: Trial, time_s: Array, force_f0: Array) -> dict[str, floa
     until = still_until(trial.time_s, trial.length_change_l0, restretched)
     found = redevelopment(time_s, force_f0, restretched, until)
     return None if found is None else {"k_per_s": found.k_per_s, "se_per_s": found.se_per_s}
-
-
-def _fibre_path(fibres: Mapping[str, str] | None, name: str) -> Path:
-    if fibres is None:
-        return find_fibre_file(name)
-    if name not in fibres:
-        raise UserError(
-            f"the bag's fibre is '{name}', the fibre files given are of {', '.join(fibres)}; give its file too"
-        )
-    return Path(fibres[name])
 
 
 @functools.lru_cache(maxsize=64)

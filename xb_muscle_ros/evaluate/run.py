@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.bench.golden import METHODS, SETS
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.evaluate import bags as bag_tasks
 from xb_muscle_ros.evaluate import grid, more_scores, sections
+from xb_muscle_ros.evaluate.golden import GOLDEN, OURS, golden_sources
 from xb_muscle_ros.evaluate.paper import Source, compare, readings_table
 from xb_muscle_ros.evaluate.report import write_up
-from xb_muscle_ros.evaluate.sets import ModelSet, gather
+from xb_muscle_ros.evaluate.sets import ModelSet, file_serving, gather, null_lines, served_line
 from xb_muscle_ros.evaluate.srs_scores import ALL_READINGS, READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, read_table, read_tables
 from xb_muscle_ros.evaluate.tables_text import write_csv
@@ -30,7 +30,6 @@ from xb_muscle_ros.trials.completing import Known, counted
 from xb_muscle_ros.work import Options, run, stream
 
 JOURNAL = "evaluate.journal"
-_OURS, _GOLDEN = "ours", "released output"
 _MAXIMAL_PCA = 4.5
 
 
@@ -103,7 +102,7 @@ def evaluate(request: Request, tell: Callable[[str], None] = lambda line: None) 
     """
     # Tables are read first: a fault in them shows before hours of work, and before the folder is made.
     data = read_table(request.empirical, "measured") if request.empirical is not None else None
-    golden = read_tables(request.golden, _GOLDEN) if request.golden is not None else {}
+    golden = read_tables(request.golden, GOLDEN) if request.golden is not None else {}
     results = Results({"sets": [], "force_pca": [], "k_tr": [], "residual_force_enhancement": []})
     if request.bags:
         _recordings(request, results, tell)
@@ -183,8 +182,13 @@ def _recordings(request: Request, results: Results, tell: Callable[[str], None])
     trials = results.trials = _of_bags(request, results, made)
     _settle_problems(request, trials, tell)
     results.warnings += trials.warnings
-    named = [name if files is None else files[name] for name in trials.fibres]
-    results.models = [] if request.measured_only else gather(named, request.models, request.method)
+    if not request.measured_only:
+        served = served_line(files, trials.fibres)
+        results.warnings += [served] if served else []
+        # Fibres without a file of their own may share one.
+        named = list(dict.fromkeys(file_serving(files, name) for name in trials.fibres))
+        results.models = gather(named, request.models, request.method)
+        results.warnings += null_lines(results.models)
     found_sections = results.sections
     found_sections["sets"] = sections.sets_section(results.models)
     found_sections["trials"] = {
@@ -249,14 +253,15 @@ def _fibre_files(given: Sequence[str]) -> dict[str, Path] | None:
 def _settle_problems(request: Request, trials: Trials, tell: Callable[[str], None]) -> None:
     for index, problem in list(duplicates(trials)):
         trials.refuse(index, problem)
-    problems = [trials.problems[bag] for bag in sorted(trials.problems)]
+    problems = trials.problem_lines()
     if problems and not (request.skip_bad and np.any(trials.good)):
         if len(problems) == 1:
             raise UserError(problems[0])
         for problem in problems:
             tell(problem)
         raise UserError(
-            f"{len(problems)} of {len(trials.bag)} bags cannot be used; mend them, or leave them out with --skip-bad"
+            f"{len(trials.problems)} of {len(trials.bag)} bags cannot be used; mend them, or leave them out with "
+            "--skip-bad"
         )
     for problem in problems:
         tell(f"left out: {problem}")
@@ -297,7 +302,7 @@ def _paper(request: Request, results: Results, data: SrsTable, golden: Mapping[s
                 if task["pca"] == _MAXIMAL_PCA:
                     k_tr[each.name].append(one["k_tr"]["k_per_s"])
         start = end
-    sources = [Source(_OURS, tables, k_tr), *_golden_sources(golden, models, tables)]
+    sources = [Source(OURS, tables, k_tr), *golden_sources(golden, models, tables)]
     results.models, results.tables, results.data = models, tables, data
     if "srs" in results.sections:
         results.sections["srs_of_recordings"] = results.sections.pop("srs")
@@ -314,25 +319,6 @@ def _paper(request: Request, results: Results, data: SrsTable, golden: Mapping[s
     }
     for label, table in [(more_scores.MEASURED, data), *tables.items()]:
         results.sections["force_pca"] += more_scores.force_pca_of_table(table, label)
-
-
-def _golden_sources(
-    golden: Mapping[str, SrsTable], models: Sequence[ModelSet], tables: Mapping[str, SrsTable]
-) -> list[Source]:
-    """The authors' output for the sets evaluated, and ours on the same fibres where theirs are fewer."""
-    theirs: dict[str, SrsTable] = {}
-    for each in models:
-        method = next(iter(each.fibres.values())).method
-        named = [name for name, of in SETS.items() if of == each.name and name in golden]
-        # The table made with the same method where there are several.
-        named.sort(key=lambda name: METHODS.get(name, "gaussian") != method)
-        if named:
-            theirs[each.name] = golden[named[0]].only(list(each.fibres))
-    ours = {name: tables[name].only(list(theirs[name].fibres)) for name in theirs}
-    fewer = any(len(ours[name].fibres) < len(tables[name].fibres) for name in theirs)
-    count = max((len(table.fibres) for table in theirs.values()), default=0)
-    sources = [Source(f"{_OURS}, {count} fibres", ours, {})] if fewer else []
-    return [*sources, Source(_GOLDEN, theirs, {})] if theirs else []
 
 
 def _package_fibres(data: SrsTable) -> list[str]:

@@ -11,7 +11,8 @@ from types import MappingProxyType
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.models.fibre_file import Fibre, base_set, load_fibre
+from xb_muscle_ros.models.catalogue import without_effect_line
+from xb_muscle_ros.models.fibre_file import Fibre, base_set, find_fibre_file, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.registry import base_of, compose, model_of_set
 
@@ -69,6 +70,70 @@ class ModelSet:
         """How the set of each fibre was obtained, in the fibre file's words."""
         note = f"; set of {self.borrowed_from}, not fitted for this model" if self.borrowed_from else ""
         return {name: (fibre.source or "the fibre file does not say") + note for name, fibre in self.fibres.items()}
+
+
+class NoFibreFile(UserError):
+    """No fibre file serves a trial.
+
+    Attributes:
+        fibre: of the trial.
+    """
+
+    def __init__(self, fibre: str, message: str) -> None:
+        super().__init__(message)
+        self.fibre = fibre
+
+
+def file_serving(files: Mapping[str, str | Path] | None, fibre: str) -> Path:
+    """Fibre file whose parameters serve a trial; see `served_line` for what there is to say of it.
+
+    That of its fibre's name; for a name that is not known, as in a replay, the one file that was given.
+
+    Args:
+        files: that were given, by the fibre's name; None: those of the package.
+        fibre: name in the trial.
+
+    Raises:
+        NoFibreFile: several were given and none is the fibre's, one was given and the package has the fibre's own, or
+            none was given and the package has none.
+    """
+    if files is not None and fibre in files:
+        return Path(files[fibre])
+    try:
+        packaged = find_fibre_file(fibre)
+    except UserError as error:
+        if files is None:
+            raise NoFibreFile(fibre, f"{error}; give a fibre file with --fiber") from error
+        if len(files) == 1:
+            return Path(next(iter(files.values())))
+    else:
+        if files is None:
+            return packaged
+    raise NoFibreFile(
+        fibre, f"the bag's fibre is '{fibre}', the fibre files given are of {', '.join(files)}; give its file too"
+    )
+
+
+def served_line(files: Mapping[str, str | Path] | None, fibres: Sequence[str]) -> str:
+    """One line on trials that another fibre's parameters serve; empty where there are none."""
+    others = [name for name in fibres if files is not None and name not in files]
+    if files is None or not others:
+        return ""
+    return (
+        f"trials of fibre {', '.join(others)} are compared with parameters of {next(iter(files))}, the one file given"
+    )
+
+
+def null_lines(models: Sequence[ModelSet]) -> list[str]:
+    """For each set with mechanisms whose effect is exactly zero in a fibre, one line."""
+    lines = []
+    for each in models:
+        told = {name: without_effect_line(each.name, fibre.values) for name, fibre in each.fibres.items()}
+        for line in dict.fromkeys(line for line in told.values() if line):
+            named = ", ".join(name for name, text in told.items() if text == line)
+            # Values are not given on the command line here.
+            lines.append(f"model {each.name}, fibre {named}: {line.partition('; ')[0]}; fit it first")
+    return lines
 
 
 def rank(set_name: str) -> int:

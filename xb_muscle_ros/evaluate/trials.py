@@ -29,6 +29,7 @@ class Trials:
         measured: quantity -> shape (bags,); F0/L0, F0, 1/s.
         models: parameter set -> quantity -> shape (bags,), as measured, and ``rmsd_whole`` and so on, F0.
         problems: bag -> why it cannot be used, one line.
+        unserved: fibre that no fibre file serves -> its bags, each of which has a problem.
         warnings: lines, in order of the bags.
         missing: parameter set -> fibres whose file lacks it.
     """
@@ -41,6 +42,7 @@ class Trials:
         self.measured: dict[str, Array] = {name: np.full(bags, np.nan) for name in _ANSWERS}
         self.models: dict[str, dict[str, Array]] = {}
         self.problems: dict[str, str] = {}
+        self.unserved: dict[str, list[str]] = {}
         self.missing: dict[str, set[str]] = {}
         self._warnings: dict[int, list[str]] = {}
         self._codes: dict[str, int] = {}
@@ -52,6 +54,8 @@ class Trials:
         self.bag[index] = found["bag"]
         if "problem" in found:
             self.problems[found["bag"]] = found["problem"]
+            if "unserved" in found:
+                self.unserved.setdefault(found["unserved"], []).append(found["bag"])
             return
         facts = found["trial"]
         self.fibre[index], self.trial[index], self.content[index] = facts["fibre"], facts["trial"], facts["content"]
@@ -97,6 +101,16 @@ class Trials:
         self.fibre[index] = ""
         self._code[index] = -1
         self._shapes.pop(index, None)
+
+    def problem_lines(self) -> list[str]:
+        """A line for each bag that cannot be used, one alone for all whose fibre has no file."""
+        shared = {fibre: sorted(bags) for fibre, bags in sorted(self.unserved.items()) if len(bags) > 1}
+        alike = {bag for bags in shared.values() for bag in bags}
+        lines = [self.problems[bag] for bag in sorted(self.problems) if bag not in alike]
+        for bags in shared.values():
+            why = self.problems[bags[0]].removeprefix(f"bag {bags[0]}: ")
+            lines.append(f"{len(bags)} bags, from {bags[0]} to {bags[-1]}: {why}")
+        return lines
 
     def shapes(self) -> Iterator[dict[str, Any]]:
         """Facts of the trials that are isometric throughout or have one stretch alone, in order of the bags."""

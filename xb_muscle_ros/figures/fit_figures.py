@@ -7,16 +7,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.figures.fit_profiles import draw_profiles
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure, save
 from xb_muscle_ros.figures.trial_pages import Look, pages_of, panels, size_mm
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.run import Fitted
 
 _PER_PAGE = 12
-_LOOK = Look((3, 1), 0.08, "Force (F$_0$)", "Residual\n(% F$_0$)", row_mm=60.0, extra_mm=14.0)
+_LOOK = Look((3, 1), 0.08, "Force (F$_0$)", "Residual\n(% F$_0$)", row_mm=62.0, extra_mm=14.0)
+# Room above what is shown; the smallest residual that fills its axis, % F0.
+_HEADROOM, _LEAST_RESIDUAL_PERCENT = 1.15, 0.1
+# Letters over one panel.
+_LONGEST_NAME = 34
+# Up to so many coordinates a correlation matrix has room for small numbers too.
+_FEW = 10
 _KINDS = {
     "isometric_force": ("Isometric force", "F$_0$"),
     "srs_conditioning": ("SRS, unconditioned", "F$_0$/L$_0$"),
@@ -39,7 +45,7 @@ def draw(folder: Path, fitted: Fitted, found: Mapping[str, Any]) -> list[Path]:
     if len(found["features"]) > 1:
         made.append(_features(folder / "features.png", found))
     if any("profile" in row for row in found["parameters"]):
-        made.append(_profiles(folder / "profiles.png", found))
+        made.append(draw_profiles(folder / "profiles.png", found))
     if len(found["parameters"]) > 1:
         made.append(_correlation(folder / "correlation.png", found))
     return made
@@ -63,22 +69,36 @@ def _trials(path: Path, fitted: Fitted) -> list[Path]:
 
 def _panel(upper: Any, lower: Any, fitted: Fitted, trial: Any) -> list[Any]:
     time, problem = trial.force_time_s, fitted.problem
-    lines = upper.plot(time, trial.measured_f0, color=DATA, linewidth=3.0, label="measured")
+    measured = trial.measured_f0
+    lines = upper.plot(time, measured, color=DATA, linewidth=2.0, label="measured")
     start = _force(problem, problem.start, trial)
     if start is not None:
         lines += upper.plot(time, start, color=SECOND, linestyle=(0, (4, 2)), linewidth=0.9, label="start")
-        lower.plot(time, 100.0 * (trial.measured_f0 - start), color=SECOND, linestyle=(0, (4, 2)), linewidth=0.9)
+        lower.plot(time, 100.0 * (measured - start), color=SECOND, linestyle=(0, (4, 2)), linewidth=0.9)
     force = _force(problem, fitted.best.z, trial)
+    shown = measured
     if force is not None:
-        lines += upper.plot(time, force, color=MODEL, label=f"fitted ({problem.fibre.model})")
-        lower.plot(time, 100.0 * (trial.measured_f0 - force), color=MODEL)
+        lines += upper.plot(time, force, color=MODEL, linewidth=0.9, label=f"fitted ({problem.fibre.model})")
+        lower.plot(time, 100.0 * (measured - force), color=MODEL, linewidth=0.9)
+        # What the fit left is to be seen, however far off the start was.
+        most = _HEADROOM * max(100.0 * float(np.max(np.abs(measured - force))), _LEAST_RESIDUAL_PERCENT)
+        lower.set_ylim(-most, most)
+        shown = np.concatenate([measured, force])
     lower.axhline(0.0, color="black", linewidth=0.5)
     upper.tick_params(labelbottom=False)
     role = "held out" if trial.held_out else "training"
-    upper.set_title(f"{trial.name} ({trial.solution}, {role})", loc="left", fontsize=7.0)
-    upper.set_ylim(bottom=min(0.0, upper.get_ylim()[0]))
-    shown: list[Any] = lines
-    return shown
+    upper.set_title(f"{_short(trial.name)}\n{trial.solution}, {role}", loc="left", fontsize=7.0)
+    low, high = min(0.0, float(np.min(shown))), float(np.max(shown))
+    span = (high - low) or 1.0
+    upper.set_ylim(low - 0.05 * span if low < 0.0 else 0.0, low + _HEADROOM * span)
+    handles: list[Any] = lines
+    return handles
+
+
+def _short(name: str) -> str:
+    """A trial's name as far as it goes over one panel; the middle of a longer one is left out."""
+    half = (_LONGEST_NAME - 1) // 2
+    return name if len(name) <= _LONGEST_NAME else f"{name[:half]}…{name[-half:]}"
 
 
 def _force(problem: Problem, z: Any, trial: Any) -> Any:
@@ -111,44 +131,6 @@ def _features(path: Path, found: Mapping[str, Any]) -> Path:
     return path
 
 
-def _profiles(path: Path, found: Mapping[str, Any]) -> Path:
-    """Likelihood ratio against each parameter, with the interval it makes."""
-    rows = [row for row in found["parameters"] if "profile" in row]
-    columns = min(4, len(rows))
-    limit = float(np.sqrt(chi2.ppf(found["level"], 1)))
-    with figure(12.0 + 42.0 * columns, 10.0 + 38.0 * -(-len(rows) // columns)) as made:
-        for i, row in enumerate(rows):
-            axes = made.add_subplot(-(-len(rows) // columns), columns, i + 1)
-            x, root = np.array(row["profile"]).T
-            axes.plot(x, root, color=MODEL, marker="o", markersize=3)
-            axes.axhline(limit, color="black", linewidth=0.6, linestyle=":")
-            for end, closed in zip(row["interval"], row["interval_closed"], strict=True):
-                axes.axvline(end, color=SECOND, linewidth=0.8, linestyle="-" if closed else "--")
-            axes.plot([row["start"]], [0.0], marker="^", color=DATA, markersize=6, clip_on=False, zorder=1)
-            if row["log_scale"]:
-                axes.set_xscale("log")
-                axes.minorticks_off()
-                axes.set_xticks(_ticks(x))
-                axes.set_xticklabels([f"{t:.3g}" for t in _ticks(x)])
-            axes.set_ylim(-0.1, max(3.0, 1.2 * limit))
-            unit = "" if row["unit"] == "1" else f" ({row['unit']})"
-            axes.set_xlabel(f"{row['name']}{unit}")
-            if i % columns == 0:
-                axes.set_ylabel("√(likelihood ratio)")
-        percent = f"{100.0 * found['level']:g}"
-        made.suptitle(
-            f"Profiles; dotted: {percent} % limit, upright: interval (dashed: open), triangle: start", fontsize=8
-        )
-        save(made, path)
-    return path
-
-
-def _ticks(x: Any) -> list[float]:
-    """Three round-ish ticks over the range of a logarithmic axis."""
-    low, high = float(np.min(x)), float(np.max(x))
-    return [float(f"{v:.2g}") for v in np.geomspace(low, high, 3)]
-
-
 def _correlation(path: Path, found: Mapping[str, Any]) -> Path:
     """Correlation matrix, with numbers where they matter."""
     names, matrix = found["correlation"]["names"], np.array(found["correlation"]["matrix"])
@@ -160,13 +142,19 @@ def _correlation(path: Path, found: Mapping[str, Any]) -> Path:
         axes.set_yticks(range(n), names, fontsize=6.5)
         for i in range(n):
             for j in range(n):
-                if i != j and abs(matrix[i, j]) >= 0.5:
-                    dark = abs(matrix[i, j]) > 0.7
+                # Numbers carry the sign, which hues alone would lose in grey.
+                if i != j and abs(matrix[i, j]) >= (0.1 if n <= _FEW else 0.5):
                     axes.text(
-                        j, i, f"{matrix[i, j]:.1f}".replace("0.", "."), ha="center", va="center", fontsize=5.5,
-                        color="white" if dark else "black",
+                        j, i, _number(matrix[i, j]), ha="center", va="center", fontsize=5.5,
+                        color="white" if abs(matrix[i, j]) > 0.7 else "black",
                     )  # fmt: skip
         axes.spines[:].set_visible(False)
         made.colorbar(image, ax=axes, shrink=0.7, label="Correlation of estimates")
         save(made, path)
     return path
+
+
+def _number(value: float) -> str:
+    """Two decimals, never rounded up to 1."""
+    shown = min(abs(value), 0.99) if abs(value) < 1.0 else 1.0
+    return f"{'−' if value < 0.0 else ''}{shown:.2f}".replace("0.", ".", 1)

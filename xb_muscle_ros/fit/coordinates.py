@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.measurement.faults import FAULTS, Scope
+from xb_muscle_ros.models.catalogue import Entry, mechanisms_of
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.parameters import PARAMETERS
 
@@ -19,23 +20,9 @@ Array = npt.NDArray[np.float64]
 
 # What the paper fitted, over all its models (van der Zee et al. 2026, "Fitted model parameters").
 FITTED = (
-    "f",
-    "k11",
-    "k21",
-    "k22",
-    "dLcrit",
-    "kon",
-    "koop",
-    "kappa",
-    "n",
-    "JF",
-    "vmax",
-    "act_max",
-    "kse",
-    "kse0",
-    "kpe",
-    "Fpe0",
-)
+    "f", "k11", "k21", "k22", "dLcrit", "kon", "koop", "kappa", "n", "JF", "vmax", "act_max",
+    "kse", "kse0", "kpe", "Fpe0",
+)  # fmt: skip
 # How far a fit may go from its start where nothing else is said: a factor either way.
 REACH = 100.0
 # Default prior on a logarithmic scale: two thirds within a factor of e of the start, as wide as the released sets of
@@ -57,6 +44,7 @@ class Coordinate:
         lower, upper: bounds, in its unit.
         start: where the first start begins.
         prior_mean, prior_sd: normal prior on the moved scale (natural logarithm where `log`); sd inf: none.
+        others: where further starts begin in turn, in its unit; empty: around the first.
     """
 
     name: str
@@ -67,6 +55,7 @@ class Coordinate:
     start: float
     prior_mean: float
     prior_sd: float
+    others: tuple[float, ...] = ()
 
     @property
     def label(self) -> str:
@@ -97,6 +86,21 @@ class Choice:
     prior_sd: float | None = None
 
 
+def free_names(
+    fibre: Fibre, free: Sequence[str] | None, fixed: Sequence[str], ties: Mapping[str, str]
+) -> tuple[str, ...]:
+    """Names of the parameters that are moved.
+
+    Args:
+        fibre: its model.
+        free: names to move; None: those that the paper fitted, and those of the model's mechanisms.
+        fixed, ties: see `parameter_coordinates`.
+    """
+    own = [name for entry in mechanisms_of(fibre.model) for name in entry.parameters]
+    wanted = dict.fromkeys((*FITTED, *own) if free is None else free)
+    return tuple(n for n in wanted if n in fibre.values and n not in fixed and n not in ties)
+
+
 def parameter_coordinates(
     fibre: Fibre,
     free: Sequence[str] | None,
@@ -108,33 +112,73 @@ def parameter_coordinates(
 
     Args:
         fibre: start values, model and method.
-        free: names to move; None: those that the paper fitted.
+        free: see `free_names`.
         fixed: names not to move.
         ties: name -> name whose value it takes.
         choices: bounds and priors by name.
 
     Raises:
         UserError: a name the model does not have; bounds that are crossed, beyond the parameter's range or off its
-            start.
+            start; a bound or prior of a parameter that is not moved.
     """
     for name in (*(free or ()), *fixed, *ties, *ties.values(), *choices):
         if name not in fibre.values or name not in PARAMETERS:
             raise UserError(f"model {fibre.model} has no parameter '{name}'{suggest(name, fibre.values)}")
-    names = [n for n in (FITTED if free is None else free) if n in fibre.values and n not in fixed and n not in ties]
+    names = free_names(fibre, free, fixed, ties)
     for name in choices:
-        if name not in names and name not in FITTED:
+        if name not in names:
             raise UserError(f"parameter '{name}' has a bound or prior but is not fitted; add it to --free")
     for tied, source in ties.items():
         if source in ties:
             raise UserError(f"parameter '{tied}' is tied to '{source}', which is tied itself; tie both to a third one")
-    return tuple(_parameter(fibre, name, choices.get(name, Choice())) for name in dict.fromkeys(names))
+    owners = {name: entry for entry in mechanisms_of(fibre.model) for name in entry.parameters}
+    return tuple(_parameter(fibre, name, owners.get(name), choices.get(name, Choice())) for name in names)
 
 
-def _parameter(fibre: Fibre, name: str, choice: Choice) -> Coordinate:
-    row, start = PARAMETERS[name], float(fibre.values[name])
+def mechanism_coordinates(entry: Entry, values: Mapping[str, float]) -> tuple[Coordinate, ...]:
+    """Coordinates of a mechanism's parameters, started at some values.
+
+    The effect is moved on a linear scale, so that its interval can hold 0.
+    """
+    return tuple(_of_mechanism(entry, name, float(values[name])) for name in entry.parameters)
+
+
+def _of_mechanism(entry: Entry, name: str, start: float) -> Coordinate:
+    row = PARAMETERS[name]
+    if name == entry.effect:
+        lower = max(row.lower, -entry.reach * entry.size) if row.lower < 0.0 else 0.0
+        upper = min(row.upper, entry.reach * entry.size)
+        return Coordinate(name, None, False, lower, upper, start, 0.0, entry.size)
+    sd = entry.shape[name]
+    if row.lower < 0.0:
+        low, high = max(row.lower, start - 4.0 * sd), min(row.upper, start + 4.0 * sd)
+        return Coordinate(name, None, False, low, high, start, start, sd)
+    low = max(row.lower, start * math.exp(-3.0 * sd), 1e-12)
+    high = min(row.upper, start * math.exp(3.0 * sd))
+    return Coordinate(name, None, True, low, high, start, math.log(start), sd)
+
+
+def _of_paper(name: str, start: float) -> Coordinate:
+    """A parameter that no mechanism of the model's name brings."""
+    row = PARAMETERS[name]
     log = row.lower >= 0.0 and start > 0.0
     lower = max(row.lower, start / REACH) if log else row.lower
     upper = min(row.upper, start * REACH) if log else row.upper
+    if log:
+        return Coordinate(name, None, True, lower, upper, start, math.log(start), PRIOR_LOG_SD)
+    return Coordinate(name, None, False, lower, upper, start, start, abs(start) or math.inf)
+
+
+def _parameter(fibre: Fibre, name: str, owner: Entry | None, choice: Choice) -> Coordinate:
+    row, start = PARAMETERS[name], float(fibre.values[name])
+    # A shape of 0, such as a ratio that leaves one arm alone, has no logarithm to move.
+    ours = owner is not None and (name == owner.effect or start > 0.0 or row.lower < 0.0)
+    made = _of_mechanism(owner, name, start) if owner is not None and ours else _of_paper(name, start)
+    log = made.log
+    starts = fibre.starts.get(name, (start,))
+    # A value beyond the usual reach has the table's range to move in.
+    lower = made.lower if made.lower <= min(starts) else max(row.lower, 1e-12) if log else row.lower
+    upper = made.upper if made.upper >= max(starts) else row.upper
     lower = lower if choice.lower is None else choice.lower
     upper = upper if choice.upper is None else choice.upper
     where = f"parameter '{name}'"
@@ -150,21 +194,35 @@ def _parameter(fibre: Fibre, name: str, choice: Choice) -> Coordinate:
             f"{where}: starts at {start:g} {row.unit}, outside its bounds {lower:g} to {upper:g}; widen them, or "
             "start from another fibre file"
         )
-    mean = start if choice.prior_mean is None else choice.prior_mean
-    default = math.expm1(PRIOR_LOG_SD) if log else abs(start) or math.inf
-    sd = default if choice.prior_sd is None else choice.prior_sd
-    if not sd > 0.0 or (log and mean <= 0.0):
-        raise UserError(f"{where}: prior {mean:g} ± {sd:g}; needed is an sd above 0 and a mean that is allowed")
-    scaled = (math.log(mean), math.log1p(sd)) if log else (mean, sd)
-    return Coordinate(name, None, log, lower, upper, start, *scaled)
+    mean = choice.prior_mean
+    if mean is not None and log and mean <= 0.0:
+        raise UserError(f"{where}: prior mean {mean:g}; needed is one above 0 on a logarithmic scale")
+    sd = choice.prior_sd
+    if sd is not None and not sd > 0.0:
+        raise UserError(f"{where}: prior sd {sd:g}; needed is an sd above 0")
+    others = tuple(min(max(value, lower), upper) for value in starts[1:])
+    # A prior favours none of the places where the fit may begin; that of an effect is about its absence.
+    middle = sum(made.inward(value) for value in starts) / len(starts) if others and ours else made.prior_mean
+    default = made.prior_mean if owner is not None and name == owner.effect else middle
+    return replace(
+        made,
+        lower=lower,
+        upper=upper,
+        prior_mean=default if mean is None else math.log(mean) if log else mean,
+        prior_sd=made.prior_sd if sd is None else math.log1p(sd) if log else sd,
+        others=others,
+    )
 
 
-def population_choices(fibres: Sequence[Fibre], choices: Mapping[str, Choice]) -> dict[str, Choice]:
+def population_choices(
+    fibres: Sequence[Fibre], choices: Mapping[str, Choice], names: Sequence[str] = FITTED
+) -> dict[str, Choice]:
     """Priors from what a parameter is in other fibres, for those whose prior nobody chose.
 
     Args:
         fibres: of the model that is fitted; at least three, each with its own values.
         choices: of the user, which stay.
+        names: of the parameters that are fitted; those that the paper did not fit keep their default priors.
 
     Raises:
         UserError: too few fibres.
@@ -172,7 +230,7 @@ def population_choices(fibres: Sequence[Fibre], choices: Mapping[str, Choice]) -
     if len(fibres) < 3:
         raise UserError(f"priors from {len(fibres)} fibres; at least 3 are needed to know how fibres differ")
     made = dict(choices)
-    for name in FITTED:
+    for name in (n for n in FITTED if n in names):
         values = [fibre.values[name] for fibre in fibres if name in fibre.values]
         if len(values) < len(fibres) or min(values) <= 0.0 or made.get(name, Choice()).prior_mean is not None:
             continue
@@ -218,5 +276,12 @@ def to_json(coordinates: Sequence[Coordinate]) -> list[dict[str, Any]]:
 def from_json(rows: Sequence[Mapping[str, Any]]) -> tuple[Coordinate, ...]:
     """Coordinates from plain data."""
     return tuple(
-        Coordinate(**{**row, "prior_sd": math.inf if row["prior_sd"] is None else row["prior_sd"]}) for row in rows
+        Coordinate(
+            **{
+                **row,
+                "prior_sd": math.inf if row["prior_sd"] is None else row["prior_sd"],
+                "others": tuple(row["others"]),
+            }
+        )
+        for row in rows
     )

@@ -88,6 +88,10 @@ def fit_trials(
             raise UserError(f"weight of trial '{name}', which is not among the bags; there are {', '.join(names)}")
         if not weight >= 0.0:
             raise UserError(f"weight of trial '{name}' is {weight:g}; allowed is 0 and above")
+    bare = [trial.facts.trial for trial in trials if not trial.force_n.size]
+    if bare:
+        named = f"trial {bare[0]} has" if len(bare) == 1 else f"trials {', '.join(bare)} have"
+        raise UserError(f"{named} no measured force; a fit needs it, leave the bag{'s'[: len(bare) - 1]} out")
     return tuple(
         _fit_trial(trial, i, out, whole, float(weights.get(trial.facts.trial, 1.0)))
         for i, (trial, out) in enumerate(zip(trials, held_out, strict=True))
@@ -96,8 +100,6 @@ def fit_trials(
 
 def _fit_trial(trial: Trial, order: int, held_out: bool, whole: bool, weight: float) -> FitTrial:
     name = trial.facts.trial
-    if not trial.force_n.size:
-        raise UserError(f"trial {name} has no measured force; a fit needs it, leave the bag out")
     window = (
         (trial.time_s[0], trial.time_s[-1]) if whole else windows(trial)["whole"] or (trial.time_s[0], trial.time_s[-1])
     )

@@ -19,15 +19,15 @@ from xb_muscle_ros.work import Options, run
 Array = npt.NDArray[np.float64]
 
 
-def start_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
-    """One descent; None where the model has no solution at its start, from where nothing tells which way to go."""
+def start_task(task: Mapping[str, Any]) -> dict[str, Any]:
+    """One descent; ``lost``, why, where the model has no solution at its start, from where nothing tells the way."""
     objective = Objective(Training(Problem.from_json(task["problem"])), Scale(*task["scale"]))
     z = np.array(task["z"])
     try:
         objective.training.force(z)
         objective.training.feature_distance(z)
-    except UserError:
-        return None
+    except UserError as error:
+        return {"lost": str(error)}
     return solution_to_json(descend(objective, z))
 
 
@@ -42,7 +42,7 @@ def descended(problem: Problem, best: Solution, scale: Scale, options: Options) 
     """Where one descent from a point ends; the point itself where the model has no solution there."""
     task = {"problem": problem.to_json(), "z": best.z.tolist(), "scale": list(scale)}
     row = run(start_task, [task], nearby(options, "polish"))[0]
-    return best if row is None else solution_from_json(row)
+    return best if "lost" in row else solution_from_json(row)
 
 
 def nearby(options: Options, label: str) -> Options:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -74,30 +74,38 @@ def simulated(muscle: Muscle, features: Sequence[Feature], shifts: Mapping[float
         shifts: pCa shift of the solution by stated pCa.
 
     Raises:
-        UserError, StateViolation: see `Muscle.settle` and `Muscle.step`.
+        UserError: see `Muscle.settle` and `Muscle.step`; begins with the pCa.
     """
     out = np.empty(len(features))
     for pca in dict.fromkeys(f.pca for f in features):
+        chosen = [i for i, f in enumerate(features) if f.pca == pca]
         calcium = 10.0 ** (6.0 - pca - (shifts or {}).get(pca, 0.0))
         with naming(f"features at pCa {pca:g}"):
-            settled = muscle.settle(0.0, calcium)
-            conditioned: dict[float, Array] = {0.0: settled}
-            for i, f in enumerate(features):
-                if f.pca != pca:
-                    continue
-                if f.kind == "isometric_force":
-                    out[i] = muscle.outputs(settled).force_f0
-                elif f.kind == "srs_conditioning":
-                    out[i] = onset_stiffness(muscle, settled, calcium)
-                else:
-                    if f.amplitude_l0 not in conditioned:
-                        conditioned[f.amplitude_l0] = stretched_and_back(muscle, settled, f.amplitude_l0, calcium)
-                    recovered = waited(muscle, conditioned[f.amplitude_l0], f.recovery_s, calcium)
-                    out[i] = onset_stiffness(muscle, recovered, calcium)
+            out[chosen] = _at_calcium(muscle, [features[i] for i in chosen], calcium)
     return out
 
 
-def measured(path: Path, fibre: str, stiffness: bool = True) -> tuple[Feature, ...]:
+def _at_calcium(muscle: Muscle, features: Sequence[Feature], calcium: float) -> list[float]:
+    """Features of one solution."""
+    settled = muscle.settle(0.0, calcium)
+    conditioned: dict[float, Array] = {0.0: settled}
+    found = []
+    for f in features:
+        if f.kind == "isometric_force":
+            found.append(muscle.outputs(settled).force_f0)
+        elif f.kind == "srs_conditioning":
+            found.append(onset_stiffness(muscle, settled, calcium))
+        else:
+            if f.amplitude_l0 not in conditioned:
+                conditioned[f.amplitude_l0] = stretched_and_back(muscle, settled, f.amplitude_l0, calcium)
+            recovered = waited(muscle, conditioned[f.amplitude_l0], f.recovery_s, calcium)
+            found.append(onset_stiffness(muscle, recovered, calcium))
+    return found
+
+
+def measured(
+    path: Path, fibre: str, stiffness: bool = True, tell: Callable[[str], None] = lambda line: None
+) -> tuple[Feature, ...]:
     """Features of one fibre from a table of measurements such as ``empirical_srs.json``.
 
     Isometric force is taken once for each pCa (mean over trials), stiffness of conditioning stretches as well, that of
@@ -108,6 +116,7 @@ def measured(path: Path, fibre: str, stiffness: bool = True) -> tuple[Feature, .
         path: JSON with ``pCa``, ``recovery_s``, ``amplitude_L0``, ``fibres``: quantity -> [pCa][recovery][amplitude].
         fibre: name of the fibre.
         stiffness: with SRS, or isometric force alone.
+        tell: called with a line for each solution whose test stretches are left out.
 
     Raises:
         UserError: no such file or fibre, or nothing measured.
@@ -133,6 +142,10 @@ def measured(path: Path, fibre: str, stiffness: bool = True) -> tuple[Feature, .
             if stiffness and cells["srs_test"][i][j][k] is not None
         ]
         if _broken([f.value for f in stretches], np.array(cells["srs_conditioning"][i], dtype=np.float64)):
+            tell(
+                f"features {path}: {len(stretches)} test stretches at pCa {pca:g} are left out, their stiffness is "
+                "that of a fibre that has run down"
+            )
             stretches = []
         shared = max(1.0, len(stretches) / _INDEPENDENT_PER_SOLUTION) ** 0.5
         found += [replace(f, sd=f.sd * shared) for f in stretches]

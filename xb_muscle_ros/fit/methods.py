@@ -49,7 +49,7 @@ def difference(problem: Problem, z: Array) -> Difference:
     """Difference of the problem's own method from the Gaussian form at a point, training data only.
 
     Raises:
-        UserError, StateViolation: see `Problem.true_forces`.
+        UserError: see `Problem.true_forces`.
     """
     return _from_json(_difference(problem, z, [t.name for t in Training(problem).trials], True))
 

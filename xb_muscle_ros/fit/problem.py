@@ -77,7 +77,7 @@ class Problem:
         """The fibre's force at the samples of trials, F0, before the recording's faults.
 
         Raises:
-            UserError, StateViolation: see `Muscle.settle` and `Muscle.run`.
+            UserError: see `Muscle.settle` and `Muscle.run`; begins with the trial's name.
         """
         settled: dict[tuple[float, float], Array] = {}
         found = []
@@ -104,7 +104,7 @@ class Problem:
         """Recorded force of trials (default: all) at a point, F0.
 
         Raises:
-            UserError, StateViolation: see `true_forces`.
+            UserError: see `true_forces`.
         """
         chosen = self.trials if trials is None else trials
         forces = self.true_forces(Muscle(self.fibre_at(z)), z, chosen)
@@ -127,7 +127,7 @@ class Problem:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, so that a worker elsewhere can have it."""
-        fibre = {**self.fibre.__dict__, "values": dict(self.fibre.values), "path": None}
+        fibre = {**self.fibre.__dict__, "values": dict(self.fibre.values), "path": None, "starts": {}}
         return {
             "fibre": {**fibre, "available_models": list(self.fibre.available_models)},
             "trials": [trial.to_json() for trial in self.trials],

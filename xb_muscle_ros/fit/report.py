@@ -10,18 +10,22 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.stats import chi2
 
 from xb_muscle_ros import __version__
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import write_text
 from xb_muscle_ros.fit.calibration import calibrated_force
+from xb_muscle_ros.fit.cautions import cautions
 from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.fit.data import FitTrial
-from xb_muscle_ros.fit.methods import fast_form
+from xb_muscle_ros.fit.ends import PRIOR, closes, quadratic_ends
 from xb_muscle_ros.fit.problem import Problem, touches
 from xb_muscle_ros.fit.run import Fitted
+from xb_muscle_ros.fit.start import held, unfitted_nuisances
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.fit.uncertainty import correlation
+from xb_muscle_ros.measurement.faults import FAULTS
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.fibre_writing import write_fibre
 from xb_muscle_ros.models.muscle import Muscle
@@ -30,14 +34,10 @@ from xb_muscle_ros.scores.rmsd import force_rmsd
 
 Array = npt.NDArray[np.float64]
 
-# From here on two coordinates are told to be hardly told apart.
-_TWINS = 0.95
-# Starts that end this much above the best one in RMSD ended elsewhere.
-_SAME = 0.05
+# Of intervals by the curvature where no level was asked for.
+LEVEL = 0.95
 # So much of the way between its bounds counts as at a bound.
 _AT_BOUND = 1e-3
-# Sums over bins h apart miss a normal density of standard deviation w by 2 exp(-2 (pi w / h)^2): at 1.25 by 7e-6.
-_WIDEST_BIN = 1.25
 
 
 def trial_rows(fitted: Fitted) -> list[dict[str, Any]]:
@@ -91,17 +91,23 @@ def mean_rmsd(rows: Sequence[Mapping[str, Any]], held_out: bool, key: str) -> fl
 
 
 def parameter_rows(fitted: Fitted) -> list[dict[str, Any]]:
-    """Every coordinate with start, value, standard deviation and interval."""
+    """Every coordinate with start, value, standard deviation and interval.
+
+    The interval is that of the profile where there is one, else that of the curvature.
+    """
+    coordinates, shape = fitted.problem.coordinates, fitted.shape
     lower, upper = fitted.problem.bounds
-    sds = np.sqrt(np.diag(fitted.shape.covariance))
+    sds = np.sqrt(np.diag(shape.covariance))
+    wanted = float(np.sqrt(chi2.ppf(fitted.settings.level or LEVEL, 1)))
+    quadratic = quadratic_ends(coordinates, fitted.best.z, shape.covariance, shape.prior_share, shape.weak, wanted)
     rows = []
-    for j, c in enumerate(fitted.problem.coordinates):
+    for j, c in enumerate(coordinates):
         z = float(fitted.best.z[j])
         share = (z - lower[j]) / (upper[j] - lower[j])
         row: dict[str, Any] = {
             "name": c.name,
             "group": c.group,
-            "unit": PARAMETERS[c.name].unit if c.group is None else _fault_unit(c),
+            "unit": PARAMETERS[c.name].unit if c.group is None else FAULTS[c.name].unit,
             "start": c.start,
             "value": c.outward(z),
             "log_scale": c.log,
@@ -111,87 +117,28 @@ def parameter_rows(fitted: Fitted) -> list[dict[str, Any]]:
             "prior_sd": None if math.isinf(c.prior_sd) else c.prior_sd,
             "at_bound": "lower" if share < _AT_BOUND else "upper" if share > 1.0 - _AT_BOUND else None,
         }
-        if j in fitted.sides:
-            low, high = fitted.sides[j]
-            row["interval"] = [c.outward(low.end), c.outward(high.end)]
-            row["interval_closed"] = [low.closed, high.closed]
-            row["profile"] = [[c.outward(x), root] for x, root in sorted({*low.points, *high.points})]
+        sides = fitted.sides.get(j)
+        ends = [(side.end, side.ended_by) for side in sides] if sides else list(quadratic[j])
+        row["interval"] = [c.outward(end) for end, _ in ends]
+        row["interval_closed"] = [closes(what) for _, what in ends]
+        row["interval_ended_by"] = [what for _, what in ends]
+        row["interval_kind"] = "profile" if sides else "curvature"
+        if sides:
+            row["profile"] = [[c.outward(x), root] for x, root in sorted({*sides[0].points, *sides[1].points})]
         rows.append(row)
     return rows
 
 
-def _fault_unit(c: Coordinate) -> str:
-    from xb_muscle_ros.measurement.faults import FAULTS
+def as_json(fitted: Fitted, provenance: Mapping[str, Any], notes: Sequence[str] = ()) -> dict[str, Any]:
+    """Everything, for ``fit.json``.
 
-    return FAULTS[c.name].unit
-
-
-def warnings(fitted: Fitted) -> list[str]:
-    """What a user should know before trusting the fit, one line each."""
-    found = []
-    coordinates = fitted.problem.coordinates
-    for j, row in enumerate(parameter_rows(fitted)):
-        label = coordinates[j].label
-        if row["at_bound"]:
-            bound = row["bounds"][0 if row["at_bound"] == "lower" else 1]
-            found.append(
-                f"{label} is at its {row['at_bound']} bound, {bound:g} {row['unit']}; widen it, or fix it there"
-            )
-        if "interval_closed" in row and not all(row["interval_closed"]):
-            sides = [s for s, closed in zip(("below", "above"), row["interval_closed"], strict=True) if not closed]
-            found.append(f"{label} is not identifiable: nothing in the data bounds it {' or '.join(sides)}")
-        elif bool(fitted.shape.weak[j]):
-            found.append(f"{label} is not identifiable on its own: the data see it only together with others")
-    matrix = correlation(fitted.shape.covariance)
-    for i in range(len(coordinates)):
-        for j in range(i):
-            if abs(matrix[i, j]) > _TWINS:
-                pair = f"{coordinates[j].label} and {coordinates[i].label}"
-                found.append(f"{pair} are hardly told apart (correlation {matrix[i, j]:.2f}); fix or tie one of them")
-    ends = [s for s in fitted.starts if s is not None]
-    best = min((s.cost for s in ends), default=0.0)
-    off = [s for s in ends if s.cost > best + max(2.0, _SAME * best)]
-    if off:
-        found.append(
-            f"starts disagree: {len(off)} of {len(ends)} ended in worse places; trust the fit only with more starts"
-        )
-    lost = len(fitted.starts) - len(ends)
-    if lost:
-        found.append(f"{lost} of {len(fitted.starts)} starts led nowhere, because the model has no solution there")
-    if not fitted.best.converged:
-        found.append("the descent was cut short before it came to rest; start again from the file it wrote")
-    found += _of_grid(fitted)
-    if not fitted.settled:
-        found.append("profiles went on finding better points: the minimum is not settled; give more starts")
-    return found
-
-
-def _of_grid(fitted: Fitted) -> list[str]:
-    """What the strain grid of a fit leaves to be desired."""
-    problem, found = fitted.problem, []
-    fibre = problem.fibre_at(fitted.best.z)
-    if fast_form(problem) is problem:
-        return []
-    width = 2.0 * fibre.values["strain_range"] / (fibre.values["bins"] - 1.0)
-    attaching = fibre.values["w"]
-    if width > _WIDEST_BIN * attaching:
-        enough = math.ceil(2.0 * fibre.values["strain_range"] / (_WIDEST_BIN * attaching)) + 1
-        found.append(
-            f"strain bins of {width:.2g} power strokes are too wide for heads that attach with an sd of "
-            f"{attaching:.2g}: forces err in jumps of up to some 0.1 % F0; use --set bins={enough} or more"
-        )
-    if not fitted.method_settled:
-        found.append(
-            f"the fit by {fibre.method} did not settle: the corrected Gaussian form is {fitted.mismatch_f0:.1g} F0 off;"
-            " start again from the file it wrote"
-        )
-    return found
-
-
-def as_json(fitted: Fitted, provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Everything, for ``fit.json``."""
+    Args:
+        fitted: the fit.
+        provenance: what it was given.
+        notes: lines on what was taken for granted before it began.
+    """
     rows = trial_rows(fitted)
-    problem = fitted.problem
+    problem, parameters = fitted.problem, parameter_rows(fitted)
     training = Training(problem)
     return {
         "version": __version__,
@@ -218,8 +165,11 @@ def as_json(fitted: Fitted, provenance: Mapping[str, Any]) -> dict[str, Any]:
             {**f.__dict__, "model": f.value + float(d) * f.sd}
             for f, d in zip(training.features, training.feature_distance(fitted.best.z), strict=True)
         ],
-        "parameters": parameter_rows(fitted),
+        "parameters": parameters,
         "ties": dict(problem.ties),
+        "held": held(problem),
+        "nuisances_not_fitted": unfitted_nuisances(problem),
+        "notes": list(notes),
         "correlation": {
             "names": [c.label for c in problem.coordinates],
             "matrix": correlation(fitted.shape.covariance).tolist(),
@@ -228,7 +178,7 @@ def as_json(fitted: Fitted, provenance: Mapping[str, Any]) -> dict[str, Any]:
             None if s is None else {"cost": s.cost, "rmsd_f0": s.rmsd_f0, "evaluations": s.evaluations}
             for s in fitted.starts
         ],
-        "warnings": warnings(fitted),
+        "warnings": cautions(fitted, parameters, rows),
     }
 
 
@@ -237,11 +187,9 @@ def table(found: Mapping[str, Any]) -> str:
     lines = [f"{'parameter':24s} {'start':>11s} {'fitted':>11s}  {'interval':25s} unit"]
     for row in found["parameters"]:
         label = f"{row['name']}[{row['group']}]" if row["group"] else row["name"]
-        interval = ""
-        if "interval" in row:
-            (low, high), (left, right) = row["interval"], row["interval_closed"]
-            interval = f"{'' if left else '<'}{low:.4g} to {'' if right else '>'}{high:.4g}"
+        interval = f"{_end(row, 0)} to {_end(row, 1)}"
         lines.append(f"{label:24s} {row['start']:11.5g} {row['value']:11.5g}  {interval:25s} {row['unit']}")
+    lines += _held_lines(found)
     lines += ["", f"{'trial':40s} {'':9s} {'before':>8s} {'after':>8s}  RMSD, % F0"]
     for row in found["trials"]:
         what = "held out" if row["held_out"] else "training" if row["weight"] > 0.0 else "no weight"
@@ -254,6 +202,29 @@ def table(found: Mapping[str, Any]) -> str:
         if found[key] is not None:
             lines.append(f"{'all':40s} {what:9s} {_percent(found['before'][key])} {_percent(found[key])}")
     return "\n".join(lines)
+
+
+def _end(row: Mapping[str, Any], side: int) -> str:
+    """One end of an interval: ``<`` or ``>`` where it is open, ``~`` before one that the prior makes."""
+    what = row["interval_ended_by"][side]
+    mark = "" if closes(what) else "~" if what == PRIOR else "<>"[side]
+    return f"{mark}{row['interval'][side]:.4g}"
+
+
+def _held_lines(found: Mapping[str, Any]) -> list[str]:
+    """What was not fitted, a line for each kind; and what the marks of the intervals say, where there are some."""
+    rows = found["parameters"]
+    marks = {_end(row, side)[0] for row in rows for side in (0, 1)} & {"<", ">", "~"}
+    lines = ["< >: open, no end in the data; ~: the prior's end"] if marks else []
+    if any(row["interval_kind"] == "curvature" and row["group"] is None for row in rows):
+        lines.append("intervals are those of the curvature at the best point: profiles were left out")
+    if found["ties"]:
+        lines.append(f"tied: {', '.join(f'{a} = {b}' for a, b in found['ties'].items())}")
+    if found["held"]:
+        lines.append(f"held at their values: {', '.join(f'{n} {v:.5g}' for n, v in found['held'].items())}")
+    if found["nuisances_not_fitted"]:
+        lines.append(f"taken as absent: {', '.join(found['nuisances_not_fitted'])}")
+    return lines
 
 
 def _percent(value: float | None) -> str:
@@ -277,6 +248,7 @@ def write_fitted(path: Path, fitted: Fitted, found: Mapping[str, Any]) -> Fibre:
         f"{data['fibre_of_trials']}{where}; started from {data['start']}"
     )
     fibre = replace(fibre, source=source, path=None)
+    constants = f"reference_length_m {fibre.reference_length_m:g}, f0_n {fibre.f0_n:g}"
     faults = [f"{c.label} {c.outward(float(z)):.4g}" for c, z in _faults(fitted)]
     comments = [
         f"Fibre {fibre.name}, model {fibre.model}, method {fibre.method}; everything on the fit is in {data['json']}.",
@@ -284,6 +256,8 @@ def write_fitted(path: Path, fitted: Fitted, found: Mapping[str, Any]) -> Fibre:
         f"Trials held out: {', '.join(held) or 'none'}.",
         f"Seed {fitted.settings.seed}, {fitted.settings.starts} starts, cost {found['cost']:.6g}.",
         f"Faults of the measurement that were fitted beside: {', '.join(faults) or 'none'}.",
+        f"Constants ({constants}) are those of the {'trials' if fitted.problem.trials else 'start file'}.",
+        f"Parameters held at their values: {', '.join(found['held']) or 'none'}.",
     ]
     write_fibre(path, fibre, comments)
     # Validate what a user will load, with its own parameters compiled.

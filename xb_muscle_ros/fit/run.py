@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.fit.descents import solution_from_json, solution_to_json, start_task
 from xb_muscle_ros.fit.features import F0_ANCHOR
 from xb_muscle_ros.fit.methods import fast_form
@@ -25,8 +26,8 @@ from xb_muscle_ros.work import Options, run, stream
 
 Array = npt.NDArray[np.float64]
 
-# Spread of further starts around the first, on the moved scale; of faults in their standard deviations.
-_SPREAD, _FAULT_SPREAD = 0.7, 0.5
+# Spread of further starts around the first, on the moved scale; of what is linear in its prior's standard deviations.
+_SPREAD, _LINEAR_SPREAD = 0.7, 0.5
 # How often a profile may find a better point before the fit is called unsettled.
 _RESTARTS = 3
 
@@ -62,6 +63,7 @@ class Fitted:
         mismatch_f0: of a method other than the Gaussian form, how far the corrected Gaussian form is from it at the
             best point (root mean square, F0); see `rounds`.
         method_settled: False where the best point is not the method's own: rounds went on, or led nowhere.
+        lost: for each start without a solution, why; names the trial, state and time.
     """
 
     problem: Problem
@@ -74,6 +76,7 @@ class Fitted:
     settled: bool
     mismatch_f0: float = 0.0
     method_settled: bool = True
+    lost: tuple[str, ...] = ()
 
 
 def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
@@ -100,8 +103,10 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
     finite_start(training)
     plain = fast.to_json()
     tasks = [{"problem": plain, "z": z.tolist(), "scale": list(FIRST)} for z in _starts(problem, settings)]
-    starts = _descended(tasks, options)
-    best = min((s for s in starts if s is not None), key=lambda s: s.cost)
+    starts, lost = _descended(tasks, options)
+    best = min((s for s in starts if s is not None), key=lambda s: s.cost, default=None)
+    if best is None:
+        raise UserError(f"none of {len(starts)} starts has a solution: {lost[0]}; start from another fibre file")
     sides: dict[int, tuple[Side, Side]] = {}
     settled, known = False, None
     for _ in range(_RESTARTS):
@@ -118,7 +123,7 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
             break
         best = best._replace(z=better)
     return Fitted(
-        problem, settings, best, scale, tuple(starts), shape, sides, settled, found.mismatch_f0, found.settled
+        problem, settings, best, scale, tuple(starts), shape, sides, settled, found.mismatch_f0, found.settled, lost
     )
 
 
@@ -131,22 +136,35 @@ def profile_task(task: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _starts(problem: Problem, settings: Settings) -> list[Array]:
-    """Where descents begin: the fibre's own values, then random points around them within the bounds."""
+    """Where descents begin: the fibre's own values, then random points around these or around a coordinate's others."""
     if settings.starts < 1:
         raise UserError(f"number of starts is {settings.starts}; allowed is 1 and more")
     random = np.random.default_rng(settings.seed)
     lower, upper = problem.bounds
-    spread = np.array([_SPREAD if c.log else _FAULT_SPREAD * min(c.prior_sd, 1.0) for c in problem.coordinates])
-    others = [problem.start + spread * random.normal(size=lower.size) for _ in range(settings.starts - 1)]
+    spread = np.array([_spread(c) for c in problem.coordinates])
+    others = [
+        np.array([c.inward((c.start, *c.others)[k % (1 + len(c.others))]) for c in problem.coordinates])
+        + spread * random.normal(size=lower.size)
+        for k in range(1, settings.starts)
+    ]
     return [np.clip(z, lower, upper) for z in (problem.start, *others)]
 
 
-def _descended(tasks: Sequence[Mapping[str, Any]], options: Options) -> list[Solution | None]:
-    """All descents, telling the best so far."""
+def _spread(c: Coordinate) -> float:
+    if c.log:
+        return _SPREAD
+    # Without a prior a linear scale says nothing of sizes.
+    return _LINEAR_SPREAD * (c.prior_sd if np.isfinite(c.prior_sd) else 1.0)
+
+
+def _descended(tasks: Sequence[Mapping[str, Any]], options: Options) -> tuple[list[Solution | None], tuple[str, ...]]:
+    """All descents, telling the best so far; and why those that came to nothing did, in the order of the starts."""
     found: list[Solution | None] = [None] * len(tasks)
+    lost: dict[int, str] = {}
     best = float("inf")
     for index, row in stream(start_task, tasks, replace(options, label="starts")):
-        if row is None:
+        if "lost" in row:
+            lost[index] = row["lost"]
             continue
         found[index] = solution = solution_from_json(row)
         if solution.cost < best:
@@ -156,7 +174,7 @@ def _descended(tasks: Sequence[Mapping[str, Any]], options: Options) -> list[Sol
                     f"cost {solution.cost:.6g}, {100.0 * solution.rmsd_f0:.3f} % F0, {solution.evaluations} evaluations"
                 )
                 Progress.write(f"start {index + 1} of {len(tasks)}: {what}, the best so far", sys.stderr)
-    return found
+    return found, tuple(lost[index] for index in sorted(lost))
 
 
 def _profiles(
@@ -167,6 +185,6 @@ def _profiles(
     task = {"problem": problem.to_json(), "best": solution_to_json(best), "scale": list(scale), "level": level}
     tasks = [{**task, "index": j, "up": up} for j in chosen for up in (False, True)]
     rows = run(profile_task, tasks, replace(options, label="profiles"))
-    sides = [Side(r["end"], r["closed"], [(x, y) for x, y in r["points"]], r["better"]) for r in rows]
+    sides = [Side(r["end"], r["ended_by"], [(x, y) for x, y in r["points"]], r["better"]) for r in rows]
     better = next((np.array(side.better) for side in sides if side.better is not None), None)
     return {j: (sides[2 * k], sides[2 * k + 1]) for k, j in enumerate(chosen)}, better

@@ -41,7 +41,7 @@ class Training:
         """Recorded force of all training trials, concatenated, F0.
 
         Raises:
-            UserError, StateViolation: see `Problem.true_forces`.
+            UserError: see `Problem.true_forces`.
         """
         true = self.true_forces(z)
         found = [self.problem.recorded(z, t, f) for t, f in zip(self.trials, true, strict=True)]
@@ -51,7 +51,7 @@ class Training:
         """Model minus measured feature in standard deviations, shape (features,).
 
         Raises:
-            UserError, StateViolation: see `features.simulated`.
+            UserError: see `features.simulated`.
         """
         if not self.features:
             return np.empty(0)
@@ -64,7 +64,7 @@ class Training:
         """The fibre's force in each training trial before the recording's faults, F0.
 
         Raises:
-            UserError, StateViolation: see `Problem.true_forces`.
+            UserError: see `Problem.true_forces`.
         """
         key = z.tobytes()
         if self._at is None or self._at[0] != key:

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import chi2
 
+from xb_muscle_ros.fit.ends import BOUND, UNSETTLED, of_parameters, profile_end
 from xb_muscle_ros.fit.noise import noise_autocovariances, score_covariance
 from xb_muscle_ros.fit.solve import Objective, Solution, descend
 
@@ -34,11 +35,13 @@ class Curvature(NamedTuple):
         covariance: of the coordinates on the moved scale, shape (p, p).
         inflation: variance over what the curvature alone would say, shape (p,).
         weak: coordinates whose direction the data hardly see, shape (p,).
+        prior_share: share of what is known of a coordinate that model parameters' priors tell, shape (p,).
     """
 
     covariance: Array
     inflation: Array
     weak: npt.NDArray[np.bool_]
+    prior_share: Array
 
 
 def curvature(objective: Objective, z: Array) -> Curvature:
@@ -70,21 +73,24 @@ def curvature(objective: Objective, z: Array) -> Curvature:
     covariance = inverse @ v @ inverse
     weak = np.sqrt(np.sum(vectors[:, ~seen] ** 2, axis=1)) > 0.1
     inflation = np.diag(covariance) / np.maximum(np.diag(inverse), 1e-300)
-    return Curvature(covariance, np.where(weak, 1.0, inflation), weak)
+    # Along the direction in which a coordinate's profile goes.
+    along = inverse / np.sqrt(np.maximum(np.diag(inverse), 1e-300))
+    share = np.sum(of_parameters(training.problem.coordinates)[:, None] * along**2, axis=0)
+    return Curvature(covariance, np.where(weak, 1.0, inflation), weak, share)
 
 
 class Side(NamedTuple):
     """One end of an interval.
 
     Attributes:
-        end: on the moved scale; the bound where the interval is open.
-        closed: whether the data end it; else the bound does.
+        end: on the moved scale; where nothing ends the interval before, the coordinate's own bound.
+        ended_by: see `ends`; only data close an interval.
         points: pairs of coordinate and root of the likelihood ratio, in order of computing.
         better: a point better than the one the profile started from, or None.
     """
 
     end: float
-    closed: bool
+    ended_by: str
     points: list[tuple[float, float]]
     better: list[float] | None
 
@@ -109,6 +115,13 @@ def profile_side(
     # The others follow as the covariance says; where it says nothing they start from where they were.
     along = shape.covariance[:, index] / max(sd * sd, 1e-300)
     origin, points = float(best.z[index]), [(float(best.z[index]), 0.0)]
+    inflation = float(shape.inflation[index])
+    reaches: dict[float, Solution] = {}
+
+    def ended(target: float) -> Side:
+        what = profile_end(objective, best, reaches[target], index, inflation, wanted)
+        return Side(target, what, points, None)
+
     distance = wanted * sd if 0.0 < sd < 1e3 else 0.5
     reached = origin
     for _ in range(_POINTS):
@@ -118,22 +131,23 @@ def profile_side(
         guess = np.clip(best.z + along * (target - origin), lower, upper)
         guess[index] = target
         found = descend(objective, guess, held=index, most=30, tolerance=1e-4)
-        gain = 2.0 * (found.cost - best.cost) / float(shape.inflation[index])
+        gain = 2.0 * (found.cost - best.cost) / inflation
         if gain < -0.02:
-            return Side(target, False, points, found.z.tolist())
+            return Side(target, UNSETTLED, points, found.z.tolist())
         root = float(np.sqrt(max(gain, 0.0)))
         points.append((target, root))
+        reaches[target] = found
         reached = target
         if abs(root - wanted) < _CLOSE:
-            return Side(target, True, points, None)
+            return ended(target)
         if at_bound and root < wanted:
-            return Side(bound, False, points, None)
+            return Side(bound, BOUND, points, None)
         distance = _next_distance(points, origin, wanted)
     inside = [p for p in points if p[1] >= wanted]
     # The search did not settle: the nearest point that is out, if there is one.
     if inside:
-        return Side(min(inside, key=lambda p: abs(p[0] - origin))[0], True, points, None)
-    return Side(reached, False, points, None)
+        return ended(min(inside, key=lambda p: abs(p[0] - origin))[0])
+    return Side(reached, UNSETTLED, points, None)
 
 
 def _next_distance(points: list[tuple[float, float]], origin: float, wanted: float) -> float:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 
 import yaml
 
 from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.models.catalogue import starts_for, swapped_in
 from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked, complete
 from xb_muscle_ros.models.registry import METHODS, SEPARATOR, base_of, compose, model_of_set, split_set
 
@@ -32,6 +33,8 @@ class Fibre:
         source: where the set's values come from: what the file says of this set under ``sources``, else of all.
         path: the file, or None where the values came as parameters.
         available_models: sets that the file holds; their variants are available as well.
+        starts: of parameters that no set gives, all values that the catalogue of mechanisms would begin a fit with,
+            the first of them in `values`; empty unless asked for.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Fibre:
     source: str
     path: Path | None
     available_models: tuple[str, ...]
+    starts: Mapping[str, tuple[float, ...]] = field(default_factory=dict, compare=False)
 
 
 def fibre_folders() -> Iterator[Path]:
@@ -76,13 +80,16 @@ def find_fibre_file(name_or_path: str | Path) -> Path:
     raise UserError(f"fibre '{name_or_path}' is not known{suggest(str(name_or_path), known)}")
 
 
-def load_fibre(name_or_path: str | Path, model: str | None = None, method: str | None = None) -> Fibre:
+def load_fibre(
+    name_or_path: str | Path, model: str | None = None, method: str | None = None, for_fit: bool = False
+) -> Fibre:
     """Read a fibre file.
 
     Args:
         name_or_path: file, or name of a fibre that comes with the package.
         model: parameter set to pick; the file's default where None.
         method: representation to use; the file's where None.
+        for_fit: see `fibre_from_parameters`.
 
     Raises:
         UserError: file missing or malformed, unknown key, model or parameter, value out of range.
@@ -102,7 +109,7 @@ def load_fibre(name_or_path: str | Path, model: str | None = None, method: str |
             f"fibre file {path} has no '/**: ros__parameters:' at its top; see config/fibers for files that have"
         )
     flat = dict(_flatten(inner, ""))
-    fibre = fibre_from_parameters(flat, f"fibre file {path}", model, method)
+    fibre = fibre_from_parameters(flat, f"fibre file {path}", model, method, for_fit)
     return replace(fibre, path=path)
 
 
@@ -125,7 +132,8 @@ def changed(fibre: Fibre, changes: Mapping[str, object], where: str) -> Fibre:
                 f"{suggest(name, values)}"
             )
         values[name] = checked(name, value, PARAMETERS, where)
-    return replace(fibre, values=MappingProxyType(values))
+    starts = MappingProxyType({name: tried for name, tried in fibre.starts.items() if name not in changes})
+    return replace(fibre, values=MappingProxyType(values), starts=starts)
 
 
 def _flatten(tree: Mapping[object, object], prefix: str) -> Iterator[tuple[str, object]]:
@@ -137,7 +145,11 @@ def _flatten(tree: Mapping[object, object], prefix: str) -> Iterator[tuple[str, 
 
 
 def fibre_from_parameters(
-    parameters: Mapping[str, object], where: str, model: str | None = None, method: str | None = None
+    parameters: Mapping[str, object],
+    where: str,
+    model: str | None = None,
+    method: str | None = None,
+    for_fit: bool = False,
 ) -> Fibre:
     """Build a fibre from flat ROS parameter names such as ``models.3state_coop.f``.
 
@@ -146,6 +158,7 @@ def fibre_from_parameters(
         where: what the messages call the source.
         model: set to pick; the parameter ``model`` where None.
         method: see `load_fibre`.
+        for_fit: take parameters of swapped blocks that no set gives from the catalogue of mechanisms, as a start.
 
     Raises:
         UserError: see `load_fibre`.
@@ -181,7 +194,10 @@ def fibre_from_parameters(
     how = method or text.get("method", "gaussian")
     if how not in METHODS:
         raise UserError(f"{where}: method '{how}' is not known{suggest(how, METHODS)}")
-    values = complete(_own_and_base(chosen, sets, where), model_of_set(chosen), f"{where}, model {chosen}", how)
+    given = _own_and_base(chosen, sets, where)
+    starts = _swapped_starts(chosen, sets, given) if for_fit else {}
+    given = {**given, **{name: values[0] for name, values in starts.items()}}
+    values = complete(given, model_of_set(chosen), f"{where}, model {chosen}", how)
     for name, number in constants.items():
         if number is None:
             raise UserError(f"{where}: constant '{name}' is missing")
@@ -195,6 +211,7 @@ def fibre_from_parameters(
         source=sources.get(chosen) or sources.get(base_set(chosen)) or text.get("source", ""),
         path=None,
         available_models=tuple(sets),
+        starts=MappingProxyType(starts),
     )
 
 
@@ -206,6 +223,14 @@ def base_set(name: str, where: str = "") -> str:
     """
     model, version = split_set(name, where)
     return base_of(model) + version
+
+
+def borrowed_line(fibre: Fibre) -> str:
+    """One line where a fibre's model uses the set of its base, mechanisms aside; empty where it has its own."""
+    if {fibre.model, fibre.model.split(SEPARATOR)[0]} & set(fibre.available_models):
+        return ""
+    base = base_set(fibre.model)
+    return f"model {fibre.model} has no parameter set of fibre {fibre.name}; that of {base} is used, as far as it goes"
 
 
 def _own_and_base(chosen: str, sets: Mapping[str, dict[str, float]], where: str) -> dict[str, float]:
@@ -231,4 +256,18 @@ def _own_and_base(chosen: str, sets: Mapping[str, dict[str, float]], where: str)
         else:
             known = {row.name for row in compose(name).parameters}
             found.update({key: value for key, value in sets[name].items() if key in wanted or key not in known})
+    return found
+
+
+def _swapped_starts(
+    chosen: str, sets: Mapping[str, dict[str, float]], given: Mapping[str, float]
+) -> dict[str, tuple[float, ...]]:
+    """The catalogue's values for swapped blocks of which no set gives a parameter."""
+    # What the block replaces tells where its own parameters may start.
+    base = {**sets.get(base_set(chosen), {}), **sets.get(chosen.split(SEPARATOR)[0], {}), **given}
+    found: dict[str, tuple[float, ...]] = {}
+    for entry in swapped_in(chosen):
+        starts, some = starts_for(entry, base), any(name in given for name in entry.parameters)
+        # With none of its own values the block takes the whole start, which may move others (more attachment, say).
+        found.update({n: v for n, v in starts.items() if not some or (n in entry.parameters and n not in given)})
     return found
