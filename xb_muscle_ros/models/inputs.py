@@ -46,7 +46,7 @@ def check(fibre: str, length_change_l0: float, calcium_um: float, dt_s: float = 
 def check_many(
     fibres: tuple[str, ...], states: Array, columns: int, length_change_l0: Array, calcium_um: Array, dt_s: float
 ) -> None:
-    """Check one step's input of many fibres: some 1 µs for 10 fibres, 3 µs for 1000.
+    """Check one step's input of many fibres: some 1 µs for 10 fibres, 4 µs for 1000.
 
     Args:
         fibres: names, for the message.
