@@ -10,8 +10,8 @@ from typing import NamedTuple
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS
-from xb_muscle_ros.node.configuration import GROUPS
+from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked
+from xb_muscle_ros.node.foreign_keys import GROUPS
 from xb_muscle_ros.node.watchdog import DECAY, HOLD, ISOMETRIC
 
 Value = bool | int | float | str | tuple[str, ...]
@@ -79,6 +79,9 @@ NODE_PARAMETERS: Mapping[str, Row] = MappingProxyType(
         ),
         "lock_memory": Row(False, "", "keep the process in memory while active, where permitted", INACTIVE),
         "state_file": Row("", "", "file that ~/save_state writes and ~/load_state reads", ALWAYS),
+        "load_state_at_start": Row(
+            False, "", "when configuring go on with the state in state_file, as ~/load_state does", UNCONFIGURED
+        ),
     }
 )
 
@@ -144,6 +147,20 @@ def check_value(name: str, row: Row, value: object) -> Value:
             f"({row.meaning})"
         )
     return value
+
+
+def check_fibre_parameter(name: str, value: object) -> float:
+    """Return a number for a parameter of the fibre, such as ``models.3state_coop.f``, or of one of many.
+
+    Raises:
+        UserError: the name is not known, or the value not allowed.
+    """
+    head, _, rest = name.partition(".")
+    if head not in GROUPS and rest:
+        head, _, rest = rest.partition(".")
+    if head == "constants":
+        return checked(rest, value, CONSTANTS, "parameters")
+    return checked(rest.rpartition(".")[2], value, PARAMETERS, "parameters")
 
 
 def _texts(name: str, value: object) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.node.diagnostics import status_name
 from xb_muscle_ros.node.inputs import stamp_ns
 from xb_muscle_ros.node.link import Link
 from xb_muscle_ros.node.outputs import room
@@ -287,7 +288,7 @@ class _Pinger:
 
 
 def _reports(message: Any, node: str) -> list[dict[str, str]]:
-    own = [status for status in message.status if f"/{status.name}" == node]
+    own = [status for status in message.status if status.name == status_name(node)]
     return [{pair.key: pair.value for pair in status.values} for status in own]
 
 
