@@ -26,7 +26,7 @@ def keys_by_name(text: str) -> Iterator[tuple[str, set[str]]]:
 def test_parameters_are_those_of_the_nodes(repo_root: Path) -> None:
     """Whoever renames one is told."""
     from xb_muscle_ros.node.parameters import NODE_PARAMETERS, TEXTS
-    from xb_muscle_ros.plant.plant_node import parameters
+    from xb_muscle_ros.plant.plant_parameters import parameters
 
     known = {
         "PARAMETERS": {*NODE_PARAMETERS, *TEXTS, "use_sim_time"},

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from types import FrameType
 
+from xb_muscle_ros import programs
 from xb_muscle_ros.errors import UserError
 
 USAGE = """\
@@ -37,8 +38,12 @@ def main(argv: Sequence[str] | None = None) -> None:
         argv: arguments without the program; those of the process where None.
 
     Raises:
-        SystemExit: code 2 after one line on stderr, where the user can mend something.
+        SystemExit: code 0, or 2 after one line on stderr, where the user can mend something.
     """
+    programs.run(lambda: _main(argv))
+
+
+def _main(argv: Sequence[str] | None) -> int:
     stop = _Stop()
     # Set here and not by rclpy, so that a signal ends the program quietly at any moment of its life, and so that SIGINT
     # counts even where a shell started the program in the background with SIGINT ignored.
@@ -48,7 +53,8 @@ def main(argv: Sequence[str] | None = None) -> None:
         _run([*(sys.argv[1:] if argv is None else argv)], stop)
     except UserError as error:
         print(f"muscle_node: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
+        return 2
+    return 0
 
 
 def _run(arguments: list[str], stop: _Stop) -> None:
