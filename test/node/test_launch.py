@@ -48,7 +48,7 @@ def test_every_launch_file_takes_what_all_take(repo_root: Path) -> None:
     for name in FILES:
         text = (repo_root / "launch" / f"{name}.launch.py").read_text(encoding="utf-8")
         assert "*common_arguments()" in text, name
-        assert "node(context, \"muscle_node\"" in text, name
+        assert 'node(context, "muscle_node"' in text, name
         assert '"autostart": bool' in text, name
 
 
