@@ -29,6 +29,7 @@ from xb_muscle_ros.node.parameters import (
     is_fibre_parameter,
     is_foreign,
     is_text,
+    meant_as_number,
     node_descriptor,
     unknown,
 )
@@ -213,10 +214,8 @@ class ParameterGate:
             name = parameter.name
             if not self._node.has_parameter(name):
                 raise _Unknown(unknown(name, self._node.get_parameters_by_prefix("")))
-            whole = parameter.type_ == Parameter.Type.INTEGER
-            if whole and self._node.get_parameter(name).type_ == Parameter.Type.DOUBLE:
-                # On a command line 80 is meant as 80.0.
-                parameter = Parameter(name, value=float(parameter.value))
+            if self._node.get_parameter(name).type_ == Parameter.Type.DOUBLE:
+                parameter = meant_as_number(parameter)
             made.append(parameter)
         return made
 
@@ -228,8 +227,8 @@ class ParameterGate:
             for parameter in parameters:
                 name, value = parameter.name, parameter.value
                 if name in NODE_PARAMETERS:
-                    check_node_parameter(name, value)
-                    self._check_moment(name, NODE_PARAMETERS[name].when)
+                    if check_node_parameter(name, value) != check_node_parameter(name, self.value(name)):
+                        self._check_moment(name, NODE_PARAMETERS[name].when)
                 elif is_fibre_parameter(name):
                     physical[name] = value
             self._check_fibre(physical)

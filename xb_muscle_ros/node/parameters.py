@@ -1,13 +1,16 @@
 """The node's own parameters, one row each, and the descriptors that ROS tools show."""
 
+# mypy: allow-untyped-calls
+
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.parameter import Parameter
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked
@@ -171,6 +174,21 @@ def _texts(name: str, value: object) -> tuple[str, ...]:
 
 
 _KINDS = {bool: "bool", int: "whole number", float: "number", str: "text"}
+
+
+def meant_as_number(parameter: Any) -> Any:
+    """A parameter for a number, given as ROS' tools give some of them.
+
+    On a command line 80 is meant as 80.0; a dump has 1e-05, without a point, and loading takes that for text.
+    """
+    if parameter.type_ == Parameter.Type.INTEGER:
+        return Parameter(parameter.name, value=float(parameter.value))
+    if parameter.type_ == Parameter.Type.STRING:
+        try:
+            return Parameter(parameter.name, value=float(parameter.value))
+        except ValueError:
+            return parameter
+    return parameter
 
 
 def unknown(name: str, declared: Iterable[str]) -> UserError:
