@@ -6,11 +6,16 @@ import os
 import sys
 from collections.abc import Callable
 
-READER_LEFT = 141
+_READER_LEFT = 141
 
 
-def run(program: Callable[[], int | None]) -> None:
-    """Run a program and exit with its code (None is 0), quietly where whoever read its output has left.
+def run(program: Callable[[], int], reader_left: int = _READER_LEFT) -> None:
+    """Run a program and exit with its code, quietly where whoever read its output has left.
+
+    Args:
+        program: returns the code.
+        reader_left: code for that case; by default that of a program which the system ends for it, because its
+            work may be half done.
 
     Raises:
         SystemExit: always.
@@ -24,5 +29,5 @@ def run(program: Callable[[], int | None]) -> None:
     except BrokenPipeError:
         # The interpreter flushes once more.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = READER_LEFT
-    raise SystemExit(code or 0)
+        code = reader_left
+    raise SystemExit(code)

@@ -244,7 +244,8 @@ def main() -> None:
     Raises:
         SystemExit: code 0, or 2 after one line on stderr, where the user can mend something.
     """
-    programs.run(_main)
+    # As for the muscle node, which see.
+    programs.run(_main, reader_left=0)
 
 
 def _main() -> int:
