@@ -170,7 +170,7 @@ def test_calcium_that_comes_twice_is_no_refusal(one: Inlet, taken: Taken) -> Non
     one.take_calcium(message([1.0], ["left"]))
     one.take_calcium(message([2.0], ["left"]), latched=True)
     assert not one.refused
-    one.forget_latched()
+    one.forget()
     one.take_calcium(message([1.0], ["left"]))
     assert one.refused == {"stamp not after the last": 1}
 

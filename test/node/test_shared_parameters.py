@@ -61,6 +61,16 @@ def test_a_node_of_many_tells_them_apart_by_its_fibres() -> None:
         assert words in str(caught.value)
 
 
+def test_parameters_of_a_fibre_that_is_gone_are_named() -> None:
+    """They were set while the node had it, and are no slip."""
+    heard: list[str] = []
+    given = {"left.constants.f0_n": 2.0}
+    assert list(configure_many(["right"], ["18Dec2017a"], given, heard.extend, earlier=["left"])) == ["right"]
+    assert heard == ["left.constants.f0_n"]
+    with pytest.raises(UserError, match="there is no fibre 'left'"):
+        configure_many(["right"], ["18Dec2017a"], given)
+
+
 def test_no_fibre_names_the_node_and_the_wildcard() -> None:
     """A parameter file for another name gives nothing."""
     with pytest.raises(UserError, match=r"no fibre is given to /leg/muscle; .* the key '/leg/muscle' or '/\*\*'"):

@@ -67,6 +67,7 @@ def configure_many(
     files: Sequence[str],
     given: Mapping[str, object],
     ignore: Callable[[Sequence[str]], None] = lambda names: None,
+    earlier: Iterable[str] = (),
 ) -> dict[str, Configured]:
     """Fibres of one model and method, each from its file, with common parameters on top and its own on top of those.
 
@@ -75,7 +76,8 @@ def configure_many(
         files: paths or packaged names.
         given: by flat ROS name: ``model``, ``constants.f0_n`` and the like count for all fibres,
             ``<fibre>.constants.f0_n`` for one; empty text counts as not given.
-        ignore: told the names of parameters that are another node's, where there are any.
+        ignore: told the names of parameters that are another node's, or of a fibre that is gone, where there are any.
+        earlier: fibres that the node had before.
 
     Returns:
         By name and in order; values are those of the set in use.
@@ -92,7 +94,10 @@ def configure_many(
     names = names or [str(whole[file]["fibre"]) for file in files]
     _check_names(names)
     # Those without a dot were looked at when they came.
-    foreign = foreign_keys([name for name in given if "." in name], (), names)
+    gone = {*earlier} - {*names}
+    dotted = [name for name in given if "." in name]
+    foreign = [name for name in dotted if name.partition(".")[0] in gone]
+    foreign += foreign_keys([name for name in dotted if name not in foreign], (), names)
     if foreign:
         ignore(foreign)
     wanted_ones = {name: value for name, value in given.items() if value != "" and name not in foreign}

@@ -52,8 +52,9 @@ class Door:
         self._logger = logger
         self._warned: dict[str, float] = {}
 
-    def forget_latched(self) -> None:
-        """Calcium from before the node listened comes no more; see `_is_repeated`."""
+    def forget(self) -> None:
+        """Begin anew: nothing is refused for good yet, and no calcium is known from before the node listened."""
+        self.refusing.clear()
         self._latched.clear()
 
     def _is_repeated(self, stamp: int, refusal: Exception, latched: bool) -> bool:

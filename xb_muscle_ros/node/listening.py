@@ -26,8 +26,8 @@ class Inlet(Protocol):
     def take_calcium(self, message: Any, latched: bool = False) -> None:
         """Callback of ``muscle/calcium``; `latched`: from before the node listened, and may come twice."""
 
-    def forget_latched(self) -> None:
-        """No such message comes twice from now on."""
+    def forget(self) -> None:
+        """What comes from now on has nothing to do with what came before."""
 
 
 class Listening:
@@ -59,6 +59,7 @@ class Listening:
         if is_open == self._inlet.open:
             return
         self._inlet.open = is_open
+        self._inlet.forget()
         for arrivals in self.arrivals.values():
             arrivals.counting = is_open
         if self._latched is not None:
@@ -76,7 +77,7 @@ class Listening:
             arrivals.lost = 0
         if self._latched is not None and self._mode == "lockstep":
             self._latched.skip()
-        self._inlet.forget_latched()
+        self._inlet.forget()
 
     def close(self) -> None:
         """Leave the topics."""

@@ -257,9 +257,8 @@ class MuscleNode(LifecycleNode):
             response.message = "the node is not configured; there is nothing to reset"
             return response
         account = self._stepping.reset()
-        if self._listening is not None and self._inlet is not None:
+        if self._listening is not None:
             self._listening.reset()
-            self._inlet.refusing.clear()
         response.success = True
         constants = _constants([*self._gate.fibres.values()])
         response.message = f"state forgotten after {account}; the next length sample settles anew; {constants}"

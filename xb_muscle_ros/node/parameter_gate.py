@@ -70,12 +70,12 @@ class ParameterGate:
         # The same as the fibres' files alone have it.
         self._of_file: dict[str, Mapping[str, object]] = {}
         self._derived: list[str] = []
+        self._earlier: set[str] = set()
         self._given: dict[str, object] = {}
-        overrides: dict[str, object] = {}
-        for name, parameter in node.get_parameters_by_prefix("").items():
-            if not is_foreign(name):
-                overrides[name] = parameter.value
-                node.undeclare_parameter(name)
+        came = node.get_parameters_by_prefix("").items()
+        overrides: dict[str, object] = {name: p.value for name, p in came if not is_foreign(name)}
+        for name in overrides:
+            node.undeclare_parameter(name)
         self._declare_own(overrides)
         for name, value in self._own_of(overrides).items():
             self._give(name, value)
@@ -125,7 +125,8 @@ class ParameterGate:
         if bool(files) == bool(file):
             found = "both" if file else "none"
             raise UserError(f"many fibres need 'fiber_files', or 'fiber_file' for all of them, found {found}; give one")
-        made = configure_many(names, files or [file] * len(names), self._given, self._ignore)
+        made = configure_many(names, files or [file] * len(names), self._given, self._ignore, self._earlier)
+        self._earlier |= {*made}
         return {f"{name}.": pair for name, pair in made.items()}
 
     def _declared(self) -> dict[str, object]:
@@ -291,7 +292,7 @@ class ParameterGate:
                 old.update(new)
                 fibre = self.fibres[prefix] = fibre_from_parameters(old, WHERE)
                 self.on_fibre([*self.fibres].index(prefix), fibre)
-            # What is set to what it is, as by loading a dump of this node, is still the file's.
+            # What is set to what it is, as by loading a dump, is still the file's.
             self._given.update({f"{prefix}{name}": value for name, value in new.items()})
         if not self.fibres:
             self._given.update(physical)
