@@ -2,61 +2,55 @@
 
 ros2 launch xb_muscle_ros closed_loop.launch.py scene:=ankle mode:=realtime elastic_tendon:=true namespace:=left_leg
 
-Ends with the body, which plays `episodes` (0: until stopped). Without `ros2 launch`: see docs/loop.md.
+Ends with the body, which plays `episodes` (0: until stopped); with `respawn:=true` both are started again instead.
+Without `ros2 launch`: see docs/loop.md.
 """
 
-from launch.actions import DeclareLaunchArgument, Shutdown
+from launch.actions import OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration, PythonExpression
-from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchDescription
+from xb_muscle_ros.node.launching import argument, common_arguments, node, values
 
 # The muscles of each scene, which are the fibres of the node.
 MUSCLES = {"ankle": ["soleus", "tibialis_anterior"], "knee": ["vasti"]}
 
-# Without a type a name like 1 would arrive as an integer and be refused.
 OF_BOTH = {"fiber_file": str, "model": str, "mode": str}
+OF_THE_MUSCLES = {"autostart": bool, "state_file": str, "load_state_at_start": bool}
 OF_THE_BODY = {"scene": str, "elastic_tendon": bool, "duration_s": float, "episodes": int}
 
 
 def generate_launch_description() -> LaunchDescription:
     """Return the launch arguments, the muscles and the body that they move."""
     arguments = [
-        DeclareLaunchArgument(
-            "fiber_file", default_value="18Dec2017a", description="fibre file, a path or the name of a packaged fibre"
-        ),
-        DeclareLaunchArgument("model", default_value="3state_coop", description="parameter set of the fibre file"),
-        DeclareLaunchArgument(
+        argument("fiber_file", "18Dec2017a", "fibre file, a path or the name of a packaged fibre"),
+        argument("model", "3state_coop", "parameter set of the fibre file"),
+        argument(
             "mode",
-            default_value="lockstep",
-            choices=["realtime", "lockstep"],
-            description="realtime: both by their own clocks; lockstep: in turn, the same bits each time",
+            "lockstep",
+            "realtime: both by their own clocks; lockstep: in turn, the same bits each time",
+            ["realtime", "lockstep"],
         ),
-        DeclareLaunchArgument("scene", default_value="ankle", choices=[*MUSCLES], description="what to move"),
-        DeclareLaunchArgument("elastic_tendon", default_value="false", description="tendons stretch"),
-        DeclareLaunchArgument("duration_s", default_value="1.0", description="length of an episode in s"),
-        DeclareLaunchArgument("episodes", default_value="0", description="how many; 0: until stopped"),
-        DeclareLaunchArgument("namespace", default_value="", description="namespace of both nodes and their topics"),
+        argument("scene", "ankle", "what to move", [*MUSCLES]),
+        argument("elastic_tendon", "false", "tendons stretch"),
+        argument("duration_s", "1.0", "length of an episode in s"),
+        argument("episodes", "0", "how many; 0: until stopped"),
+        argument("state_file", "", "file of the muscles' ~/save_state and ~/load_state"),
+        argument("load_state_at_start", "false", "the muscles go on with the states in state_file"),
+        argument("namespace", "", "namespace of both nodes and their topics"),
+        *common_arguments(),
     ]
+    return LaunchDescription([*arguments, OpaqueFunction(function=_nodes)])
+
+
+def _nodes(context):
     fibers = PythonExpression([f"{MUSCLES!r}['", LaunchConfiguration("scene"), "']"])
-    muscles = Node(
-        package="xb_muscle_ros",
-        executable="muscle_node",
-        namespace=LaunchConfiguration("namespace"),
-        output="screen",
-        parameters=[{"fibers": ParameterValue(fibers, value_type=list[str]), **_given(OF_BOTH)}],
-    )
-    body = Node(
-        package="xb_muscle_ros",
-        executable="plant_node",
-        namespace=LaunchConfiguration("namespace"),
-        output="screen",
-        parameters=[_given({**OF_BOTH, **OF_THE_BODY})],
-        on_exit=Shutdown(),
-    )
-    return LaunchDescription([*arguments, muscles, body])
-
-
-def _given(kinds: dict[str, type]) -> dict[str, ParameterValue]:
-    return {name: ParameterValue(LaunchConfiguration(name), value_type=kind) for name, kind in kinds.items()}
+    given = {"fibers": ParameterValue(fibers, value_type=list[str]), **values({**OF_BOTH, **OF_THE_MUSCLES})}
+    where = {"namespace": LaunchConfiguration("namespace")}
+    again = LaunchConfiguration("respawn").perform(context).lower() in ("true", "1")
+    end = {} if again else {"on_exit": Shutdown()}
+    return [
+        node(context, "muscle_node", given, **where),
+        node(context, "plant_node", values({**OF_BOTH, **OF_THE_BODY}), **where, **end),
+    ]

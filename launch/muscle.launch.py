@@ -1,18 +1,18 @@
 """Start one muscle node with a fibre file.
 
 ros2 launch xb_muscle_ros muscle.launch.py fiber_file:=18Dec2017a mode:=realtime rate_hz:=1000.0 namespace:=left_leg
+ros2 launch xb_muscle_ros muscle.launch.py params_file:=leg.yaml remaps:='muscle/length:=leg/length' respawn:=true
 """
 
-from launch.actions import DeclareLaunchArgument
+from launch.actions import OpaqueFunction
 from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchDescription
+from xb_muscle_ros.node.launching import argument, common_arguments, node, values
 
-# Parameters of the node that may be given at launch. The types matter: `rate_hz:=500` or `model:=1` would else arrive
-# as an integer and be refused.
+# Parameters of the node that may be given at launch.
 PARAMETERS = {
+    "autostart": bool,
     "fiber_file": str,
     "model": str,
     "mode": str,
@@ -20,6 +20,7 @@ PARAMETERS = {
     "timeout_s": float,
     "on_timeout": str,
     "state_file": str,
+    "load_state_at_start": bool,
     "use_sim_time": bool,
 }
 
@@ -27,41 +28,32 @@ PARAMETERS = {
 def generate_launch_description() -> LaunchDescription:
     """Return the launch arguments and the node they configure."""
     arguments = [
-        DeclareLaunchArgument(
-            "fiber_file", default_value="18Dec2017a", description="fibre file, a path or the name of a packaged fibre"
-        ),
-        DeclareLaunchArgument(
-            "model", default_value="", description="parameter set of the fibre file; empty: the one the file names"
-        ),
-        DeclareLaunchArgument(
+        argument("fiber_file", "18Dec2017a", "fibre file, a path or the name of a packaged fibre"),
+        argument("model", "", "parameter set of the fibre file; empty: the one the file names"),
+        argument(
             "mode",
-            default_value="realtime",
-            choices=["realtime", "lockstep"],
-            description="realtime: steps at rate_hz; lockstep: one step per length message",
+            "realtime",
+            "realtime: steps at rate_hz; lockstep: one step per length message",
+            ["realtime", "lockstep"],
         ),
-        DeclareLaunchArgument("rate_hz", default_value="1000.0", description="steps per second in realtime mode"),
-        DeclareLaunchArgument(
-            "timeout_s", default_value="0.0", description="age at which a length sample is too old; 0: no age is"
-        ),
-        DeclareLaunchArgument(
+        argument("rate_hz", "1000.0", "steps per second in realtime mode"),
+        argument("timeout_s", "0.0", "age at which a length sample is too old; 0: no age is"),
+        argument(
             "on_timeout",
-            default_value="isometric",
-            choices=["hold", "isometric", "decay"],
-            description="what happens then: length as sampled, length as it is, or that and calcium falling to zero",
+            "isometric",
+            "what happens then: length as sampled, length as it is, or that and calcium falling to zero",
+            ["hold", "isometric", "decay"],
         ),
-        DeclareLaunchArgument("state_file", default_value="", description="file of ~/save_state and ~/load_state"),
-        DeclareLaunchArgument("use_sim_time", default_value="false", description="time comes from /clock"),
-        DeclareLaunchArgument("name", default_value="muscle", description="name of the node"),
-        DeclareLaunchArgument("namespace", default_value="", description="namespace of the node and its topics"),
+        argument("state_file", "", "file of ~/save_state and ~/load_state"),
+        argument("load_state_at_start", "false", "go on with the state in state_file"),
+        argument("use_sim_time", "false", "time comes from /clock"),
+        argument("name", "muscle", "name of the node"),
+        argument("namespace", "", "namespace of the node and its topics"),
+        *common_arguments(),
     ]
-    node = Node(
-        package="xb_muscle_ros",
-        executable="muscle_node",
-        name=LaunchConfiguration("name"),
-        namespace=LaunchConfiguration("namespace"),
-        output="screen",
-        parameters=[
-            {name: ParameterValue(LaunchConfiguration(name), value_type=kind) for name, kind in PARAMETERS.items()}
-        ],
-    )
-    return LaunchDescription([*arguments, node])
+    return LaunchDescription([*arguments, OpaqueFunction(function=_nodes)])
+
+
+def _nodes(context):
+    where = {key: LaunchConfiguration(key) for key in ("name", "namespace")}
+    return [node(context, "muscle_node", values(PARAMETERS), **where)]

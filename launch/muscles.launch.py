@@ -1,19 +1,19 @@
 """Start one node of many fibres, which share topics, ticks and one compiled step.
 
 ros2 launch xb_muscle_ros muscles.launch.py fibers:='[left, right]' fiber_files:='[18Dec2017a, 13Dec2017a]'
-ros2 launch xb_muscle_ros muscles.launch.py fibers:='[left, right]' fiber_file:=18Dec2017a parameters:=muscles.yaml
+ros2 launch xb_muscle_ros muscles.launch.py fibers:='[left, right]' fiber_file:=18Dec2017a params_file:=muscles.yaml
 
 A parameter file can give each fibre values of its own: docs/node.md shows one.
 """
 
-from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.actions import OpaqueFunction
 from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
 
-from launch import LaunchContext, LaunchDescription
+from launch import LaunchDescription
+from xb_muscle_ros.node.launching import argument, common_arguments, node, values
 
 PARAMETERS = {
+    "autostart": bool,
     "fibers": list[str],
     "fiber_files": list[str],
     "fiber_file": str,
@@ -26,6 +26,7 @@ PARAMETERS = {
     "realtime_priority": int,
     "lock_memory": bool,
     "state_file": str,
+    "load_state_at_start": bool,
     "use_sim_time": bool,
 }
 
@@ -33,46 +34,37 @@ PARAMETERS = {
 def generate_launch_description() -> LaunchDescription:
     """Return the launch arguments and the node they configure."""
     arguments = [
-        DeclareLaunchArgument("fibers", default_value="['']", description="names; empty: those in the files"),
-        DeclareLaunchArgument("fiber_files", default_value="['']", description="one file for each fibre"),
-        DeclareLaunchArgument("fiber_file", default_value="", description="or one for all"),
-        DeclareLaunchArgument("model", default_value="", description="parameter set that all use; empty: the files'"),
-        DeclareLaunchArgument(
+        argument("fibers", "['']", "names; empty: those in the files"),
+        argument("fiber_files", "['']", "one file for each fibre"),
+        argument("fiber_file", "", "or one for all"),
+        argument("model", "", "parameter set that all use; empty: the files'"),
+        argument(
             "mode",
-            default_value="realtime",
-            choices=["realtime", "lockstep"],
-            description="realtime: steps at rate_hz; lockstep: one step per length message",
+            "realtime",
+            "realtime: steps at rate_hz; lockstep: one step per length message",
+            ["realtime", "lockstep"],
         ),
-        DeclareLaunchArgument("rate_hz", default_value="500.0", description="steps per second in realtime mode"),
-        DeclareLaunchArgument("threads", default_value="1", description="threads that step the fibres"),
-        DeclareLaunchArgument("timeout_s", default_value="0.0", description="age at which length is too old; 0: never"),
-        DeclareLaunchArgument(
+        argument("rate_hz", "500.0", "steps per second in realtime mode"),
+        argument("threads", "1", "threads that step the fibres"),
+        argument("timeout_s", "0.0", "age at which length is too old; 0: never"),
+        argument(
             "on_timeout",
-            default_value="isometric",
-            choices=["hold", "isometric", "decay"],
-            description="what happens then: length as sampled, length as it is, or that and calcium falling to zero",
+            "isometric",
+            "what happens then: length as sampled, length as it is, or that and calcium falling to zero",
+            ["hold", "isometric", "decay"],
         ),
-        DeclareLaunchArgument("realtime_priority", default_value="0", description="under SCHED_FIFO; 0: ordinary"),
-        DeclareLaunchArgument("lock_memory", default_value="false", description="keep the process in memory"),
-        DeclareLaunchArgument("state_file", default_value="", description="file of ~/save_state and ~/load_state"),
-        DeclareLaunchArgument("use_sim_time", default_value="false", description="time comes from /clock"),
-        DeclareLaunchArgument("parameters", default_value="", description="a parameter file, on top of the above"),
-        DeclareLaunchArgument("name", default_value="muscles", description="name of the node"),
-        DeclareLaunchArgument("namespace", default_value="", description="namespace of the node and its topics"),
+        argument("realtime_priority", "0", "under SCHED_FIFO; 0: ordinary"),
+        argument("lock_memory", "false", "keep the process in memory"),
+        argument("state_file", "", "file of ~/save_state and ~/load_state"),
+        argument("load_state_at_start", "false", "go on with the states in state_file"),
+        argument("use_sim_time", "false", "time comes from /clock"),
+        argument("name", "muscles", "name of the node"),
+        argument("namespace", "", "namespace of the node and its topics"),
+        *common_arguments(),
     ]
-    return LaunchDescription([*arguments, OpaqueFunction(function=_node)])
+    return LaunchDescription([*arguments, OpaqueFunction(function=_nodes)])
 
 
-def _node(context: LaunchContext) -> list[Node]:
-    given = {name: ParameterValue(LaunchConfiguration(name), value_type=kind) for name, kind in PARAMETERS.items()}
-    file = LaunchConfiguration("parameters").perform(context)
-    return [
-        Node(
-            package="xb_muscle_ros",
-            executable="muscle_node",
-            name=LaunchConfiguration("name"),
-            namespace=LaunchConfiguration("namespace"),
-            output="screen",
-            parameters=[given, *([file] if file else [])],
-        )
-    ]
+def _nodes(context):
+    where = {key: LaunchConfiguration(key) for key in ("name", "namespace")}
+    return [node(context, "muscle_node", values(PARAMETERS), **where)]

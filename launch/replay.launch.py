@@ -7,39 +7,28 @@ Ends with the replay. `ros2 bag play` can drive the node as well (docs/node.md);
 
 import sys
 
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, Shutdown
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
-from launch_ros.actions import Node
-from launch_ros.parameter_descriptions import ParameterValue
 
 from launch import LaunchDescription
+from xb_muscle_ros.node.launching import argument, common_arguments, node, values
+
+PARAMETERS = {"autostart": bool, "fiber_file": str, "model": str}
 
 
 def generate_launch_description() -> LaunchDescription:
     """Return the launch arguments, the node and the player."""
     arguments = [
         DeclareLaunchArgument("bags", description="a bag of a trial, or a folder of them"),
-        DeclareLaunchArgument(
-            "fiber_file", default_value="18Dec2017a", description="fibre file, a path or the name of a packaged fibre"
-        ),
-        DeclareLaunchArgument("model", default_value="3state_coop", description="parameter set of the fibre file"),
-        DeclareLaunchArgument(
-            "out",
-            default_value="replay",
-            description="folder for the report, figure and bags; those of an older replay are replaced",
-        ),
+        argument("fiber_file", "18Dec2017a", "fibre file, a path or the name of a packaged fibre"),
+        argument("model", "3state_coop", "parameter set of the fibre file"),
+        argument("out", "replay", "folder for the report, figure and bags; those of an older replay are replaced"),
+        *common_arguments(),
     ]
-    node = Node(
-        package="xb_muscle_ros",
-        executable="muscle_node",
-        output="screen",
-        parameters=[
-            {
-                "mode": "lockstep",
-                **{n: ParameterValue(LaunchConfiguration(n), value_type=str) for n in ("fiber_file", "model")},
-            }
-        ],
-    )
+    return LaunchDescription([*arguments, OpaqueFunction(function=_nodes)])
+
+
+def _nodes(context):
     player = ExecuteProcess(
         cmd=[
             *(sys.executable, "-m", "xb_muscle_ros.cli.main", "replay", LaunchConfiguration("bags"), "--live"),
@@ -49,4 +38,4 @@ def generate_launch_description() -> LaunchDescription:
         output="screen",
         on_exit=Shutdown(),
     )
-    return LaunchDescription([*arguments, node, player])
+    return [node(context, "muscle_node", {"mode": "lockstep", **values(PARAMETERS)}), player]

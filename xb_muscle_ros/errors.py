@@ -48,10 +48,17 @@ def naming(what: str) -> Iterator[None]:
         raise
 
 
+_MOST_NAMES = 40
+_NEAREST = 4
+
+
 def suggest(word: str, known: Iterable[str]) -> str:
-    """Return ``; did you mean 'x'?`` for the nearest of the known names, or the list of them."""
+    """Return ``; did you mean 'x'?`` for the nearest of the known names, or the list of them; of many the nearest."""
     names = sorted(known)
     near = difflib.get_close_matches(word, names, n=1, cutoff=0.5)
     if near:
         return f"; did you mean '{near[0]}'?"
-    return f"; known: {', '.join(names)}"
+    if len(names) <= _MOST_NAMES:
+        return f"; known: {', '.join(names)}"
+    near = difflib.get_close_matches(word, names, n=_NEAREST, cutoff=0.0)
+    return f"; nearest of {len(names)} known: {', '.join(near)}"

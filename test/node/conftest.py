@@ -173,7 +173,7 @@ class Driver:
 
     def _on_diagnostics(self, message: Any) -> None:
         for status in message.status:
-            if f"/{status.name}" == self.link.peer:
+            if status.name == f"{self.link.peer[1:]}: stepping":
                 values = {pair.key: pair.value for pair in status.values}
                 self.reports.append({**values, "level": status.level, "message": status.message})
 

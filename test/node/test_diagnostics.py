@@ -64,6 +64,51 @@ def test_length_that_stays_away() -> None:
 
 
 @pytest.mark.usefixtures("domain")
+def test_the_name_is_node_and_task() -> None:
+    """As aggregators of diagnostics expect it."""
+    assert status_of(node="/left/muscle_node").name == "left/muscle_node: stepping"
+
+
+@pytest.mark.usefixtures("domain")
+@pytest.mark.parametrize(
+    ("reason", "times", "error"),
+    [
+        ("stamp too far ahead", 2, True),
+        ("stamp not after the last", 2, True),
+        ("not finite", 2, True),
+        ("out of range", 2, True),
+        ("wrong array size", 2, True),
+        ("waiting for calcium", 2, False),
+        ("not finite", 1, False),
+    ],
+)
+def test_input_that_is_refused_for_good(reason: str, times: int, error: bool) -> None:
+    """Whatever the reason, the report names it with the remedy, also when no sample comes any more."""
+    from diagnostic_msgs.msg import DiagnosticStatus
+
+    from xb_muscle_ros.node.inlet import Refused
+
+    refusing = {("length", "left"): Refused(100.0, times, f"{reason}: so and so; do this")}
+    found = status_of(refusing=refusing, now_s=104.0)
+    assert found.level == (DiagnosticStatus.ERROR if error else DiagnosticStatus.WARN)
+    assert found.message == f"no length of left taken for 4 s, newest refused: {reason}: so and so; do this"
+    assert status_of(refusing=refusing, now_s=100.5).level == DiagnosticStatus.OK
+    both = status_of(refusing={**refusing, ("calcium", ""): refusing["length", "left"]}, now_s=104.0)
+    assert both.message.endswith("do this (1 more likewise)")
+
+
+@pytest.mark.usefixtures("domain")
+def test_lost_messages_are_a_warning_with_the_count() -> None:
+    """The count of the last second in words, that since the reset among the values."""
+    from diagnostic_msgs.msg import DiagnosticStatus
+
+    found = status_of(lost={"length": "5000", "calcium": "0"}, lost_new={"length": 4000, "calcium": 0})
+    assert (found.level, found.message) == (DiagnosticStatus.WARN, "lost 4000 length messages")
+    values = {pair.key: pair.value for pair in found.values}
+    assert (values["lost: length"], values["lost: calcium"]) == ("5000", "0")
+
+
+@pytest.mark.usefixtures("domain")
 def test_values() -> None:
     """Everything a dashboard needs, by name."""
     values = {pair.key: pair.value for pair in status_of(rate_hz=999.96, input_age_s=0.25).values}

@@ -132,3 +132,79 @@ def test_what_stops_is_an_error_each_time(request: pytest.FixtureRequest, taken:
     whose = "" if which == "one" else "right "
     assert notes.lines == [f"error {whose}stopped: state q2 is -1; call ~/reset to start again"] * 2
     assert inlet.refused == {}
+
+
+@pytest.mark.parametrize("which", ["one", "many"])
+def test_what_is_refused_stays_known_until_something_is_taken(
+    request: pytest.FixtureRequest, taken: Taken, which: str
+) -> None:
+    """By topic, and by fibre where there are many; each refusal is counted."""
+    inlet = request.getfixturevalue(which)
+    name = "left" if which == "many" else ""
+    for _ in range(3):
+        inlet.take_calcium(message([-1.0], ["left"]))
+    assert [*inlet.refusing] == [("calcium", name)]
+    assert inlet.refusing["calcium", name].times == 3
+    assert "out of range: calcium is -1 µM; allowed is 0 to 10000 µM" in inlet.refusing["calcium", name].text
+    inlet.take_length(message([1.0], ["left"]))
+    assert [*inlet.refusing] == [("calcium", name)]
+    inlet.take_calcium(message([1.0], ["left"]))
+    assert not inlet.refusing
+
+
+def test_another_fibre_does_not_clear_what_is_refused_of_one(many: InletOfMany) -> None:
+    """A message of which a part is refused for good is news as well."""
+    many.take_calcium(message([-1.0, 1.0], ["left", "right"]))
+    many.take_calcium(message([1.0], ["right"]))
+    assert [*many.refusing] == [("calcium", "left")]
+
+
+def test_calcium_that_comes_twice_is_no_refusal(one: Inlet, taken: Taken) -> None:
+    """Once as kept, once as sent; a stamp that is old for another reason is."""
+    one.take_calcium(message([1.0], ["left"]), latched=True)
+
+    def refuse(stamp: int, *values: Any) -> None:
+        raise Refusal("stamp not after the last", "so it is")
+
+    taken.take_calcium = refuse  # type: ignore[method-assign]
+    one.take_calcium(message([1.0], ["left"]))
+    one.take_calcium(message([2.0], ["left"]), latched=True)
+    assert not one.refused
+    one.forget()
+    one.take_calcium(message([1.0], ["left"]))
+    assert one.refused == {"stamp not after the last": 1}
+
+
+def test_numbers_of_a_publisher_tell_of_losses() -> None:
+    """However the executor hands them over; not across publishers, and not while nobody listens."""
+    import inspect
+
+    from xb_muscle_ros.node.arrivals import Arrivals
+
+    heard: list[Any] = []
+    arrivals = Arrivals(heard.append)
+    # rclpy asks in this way whether information is wanted.
+    with pytest.raises(TypeError):
+        inspect.signature(arrivals).bind(object())
+    inspect.signature(arrivals).bind(object(), object())
+
+    def come(number: int | None) -> None:
+        arrivals("a", {"publication_sequence_number": number})
+
+    come(5)
+    come(9)
+    arrivals.counting = True
+    come(10)
+    arrivals(("b", {"publication_sequence_number": 13}))
+    assert (arrivals.lost, heard) == (2, ["a", "a", "a", "b"])
+    arrivals.matched(SimpleNamespace(current_count=1))
+    come(1)
+    come(2)
+    assert arrivals.told() == "2"
+    arrivals.matched(SimpleNamespace(current_count=2))
+    come(900)
+    come(3)
+    come(901)
+    assert arrivals.told() == "2, not counted while 2 publish"
+    come(None)
+    assert arrivals.told() == "not known with this middleware"

@@ -26,12 +26,13 @@ def keys_by_name(text: str) -> Iterator[tuple[str, set[str]]]:
 def test_parameters_are_those_of_the_nodes(repo_root: Path) -> None:
     """Whoever renames one is told."""
     from xb_muscle_ros.node.parameters import NODE_PARAMETERS, TEXTS
-    from xb_muscle_ros.plant.plant_node import parameters
+    from xb_muscle_ros.plant.plant_parameters import parameters
 
     known = {
         "PARAMETERS": {*NODE_PARAMETERS, *TEXTS, "use_sim_time"},
         "OF_BOTH": ({*NODE_PARAMETERS} | {*TEXTS}) & {*parameters()},
         "OF_THE_BODY": {*parameters()},
+        "OF_THE_MUSCLES": {*NODE_PARAMETERS},
     }
     met = 0
     for name in FILES:
@@ -39,7 +40,16 @@ def test_parameters_are_those_of_the_nodes(repo_root: Path) -> None:
             if table in known:
                 assert keys <= known[table], (name, keys - known[table])
                 met += 1
-    assert met == 4
+    assert met == 6
+
+
+def test_every_launch_file_takes_what_all_take(repo_root: Path) -> None:
+    """And starts its nodes by the one function that makes use of it."""
+    for name in FILES:
+        text = (repo_root / "launch" / f"{name}.launch.py").read_text(encoding="utf-8")
+        assert "*common_arguments()" in text, name
+        assert 'node(context, "muscle_node"' in text, name
+        assert '"autostart": bool' in text, name
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -49,6 +59,7 @@ def test_they_load(repo_root: Path, name: str) -> None:
     pytest.importorskip("launch_ros", reason="launch_ros does not come as a wheel")
     made: Any = runpy.run_path(str(repo_root / "launch" / f"{name}.launch.py"))["generate_launch_description"]()
     declared = {argument.name for argument in made.get_launch_arguments()}
+    assert {"autostart", "params_file", "log_level", "remaps", "respawn"} <= declared
     text = (repo_root / "launch" / f"{name}.launch.py").read_text(encoding="utf-8")
     calls = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call)]
     used = {

@@ -90,3 +90,13 @@ def test_reset_before_configuring_says_so(start: Callable[..., Any]) -> None:
     driver = start(wait=False, autostart=False)
     with pytest.raises(Exception, match="not configured"):
         driver.link.reset()
+
+
+def test_a_node_that_started_by_itself_tells_why_a_later_configuration_fails(start: Callable[..., Any]) -> None:
+    """Nobody else is there to tell it then."""
+    driver = start(mode="lockstep", meet=False)
+    assert change(driver, "deactivate")
+    assert change(driver, "cleanup")
+    driver.link.set_parameters({"fiber_file": "18Dec2017x"})
+    assert not change(driver, "configure")
+    assert driver.process.log().count("cannot be configured: fibre '18Dec2017x' is not known") == 1

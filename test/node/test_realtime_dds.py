@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pytest
 
 RATE_HZ = 250.0
 
@@ -97,6 +98,9 @@ def test_node_and_plain_timer_are_measured_side_by_side(domain: int) -> None:
         assert figures["lateness_p99.9_us"] <= figures["lateness_max_us"]
         assert figures["state_violations"] == 0
         assert 0.0 < figures["cpu_share"] < 2.0
+        # Ticks and dropped ones are all that were due in the time from the reset to the last report.
+        due = figures["seconds"] * 250.0
+        assert figures["ticks"] + figures["dropped_ticks"] == pytest.approx(due, abs=30.0)
         assert {"overruns", "dropped_ticks", "rate_hz", "refused", "load"} <= figures.keys()
 
 

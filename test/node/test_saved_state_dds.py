@@ -115,10 +115,12 @@ def test_what_is_wrong_comes_back_in_the_answer(start: Callable[..., Any], tmp_p
     assert play(driver, 4, 12) == whole[4:]
 
 
-def test_realtime_goes_on_with_the_force_it_had(start: Callable[..., Any], tmp_path: Path) -> None:
-    """A new process needs neither length nor calcium to go on."""
+@pytest.mark.parametrize("at_start", [False, True])
+def test_realtime_goes_on_with_the_force_it_had(start: Callable[..., Any], tmp_path: Path, at_start: bool) -> None:
+    """A new process needs neither length nor calcium to go on, nor a call where it loads the state by itself."""
     path = tmp_path / "state.json"
-    first = start(mode="realtime", rate_hz=250.0, state_file=str(path))
+    first = start(mode="realtime", rate_hz=250.0, state_file=str(path), load_state_at_start=at_start)
+    assert (f"state file {path} does not exist yet" in first.process.log()) == at_start
 
     def fed() -> bool:
         first.send("calcium", 0.0, 31.6)
@@ -129,8 +131,29 @@ def test_realtime_goes_on_with_the_force_it_had(start: Callable[..., Any], tmp_p
     assert first.link.wait_for(fed, 30.0), first.process.log()
     force = first.forces[-1].effort[0]
     assert call(first, "save_state")[0]
-    second = start(mode="realtime", rate_hz=250.0, state_file=str(path))
-    assert not second.forces
-    assert call(second, "load_state")[0]
+    second = start(mode="realtime", rate_hz=250.0, state_file=str(path), load_state_at_start=at_start)
+    if not at_start:
+        assert not second.forces
+        assert call(second, "load_state")[0]
     assert second.link.wait_for(lambda: len(second.forces) > 5, 30.0), second.process.log()
     assert second.forces[-1].effort[0] == pytest.approx(force, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("", "'state_file' is empty; name the file there"), ("{}", "has format")],
+)
+def test_a_state_that_cannot_be_loaded_at_the_start_ends_the_node(
+    domain: int, tmp_path: Path, text: str, words: str
+) -> None:
+    """With one line and code 2; a fibre that settles anew in silence would be another one."""
+    from xb_muscle_ros.node.process import NodeProcess
+
+    given = {"fiber_file": "18Dec2017a", "load_state_at_start": True}
+    if text:
+        (tmp_path / "state.json").write_text(text, encoding="utf-8")
+        given["state_file"] = str(tmp_path / "state.json")
+    with NodeProcess(domain, given) as child:
+        assert child.wait() == 2
+        assert words in child.log()
+        assert child.log().count("\n") == 1

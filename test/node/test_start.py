@@ -46,6 +46,8 @@ BAD_ARGUMENTS = {
     "wrong choice": (["-p", f"fiber_file:={FIBRE}", "-p", "mode:=lock"], ["'lock'", "realtime or lockstep"]),
     "wrong type": (["-p", f"fiber_file:={FIBRE}", "-p", "mode:=3"], ["'mode' is 3", "text"]),
     "missing file": (["--params-file", "nowhere.yaml"], ["nowhere.yaml"]),
+    "empty file": (["--params-file", "EMPTY"], ["the node's full name or '/**' at its top"]),
+    "other node's file": (["--params-file", "OTHER"], ["no fibre is given to /muscle_node", "'/muscle_node' or '/**'"]),
     "digit in -p": (["-p", "models.3state_coop.f:=80.0"], ["in a parameter file only"]),
 }
 
@@ -72,9 +74,16 @@ def test_bad_parameter_file_ends_with_code_2_and_one_line(domain: int, tmp_path:
 
 
 @pytest.mark.parametrize("case", BAD_ARGUMENTS)
-def test_bad_arguments_end_with_code_2_and_one_line(domain: int, case: str) -> None:
+def test_bad_arguments_end_with_code_2_and_one_line(domain: int, tmp_path: Path, case: str) -> None:
     """Also where ROS itself finds fault with them."""
     arguments, expected = BAD_ARGUMENTS[case]
+    files = {
+        "EMPTY": "/**:\n  ros__parameters:\n",
+        "OTHER": f"/other:\n  ros__parameters:\n    fiber_file: {FIBRE}\n",
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    arguments = [str(tmp_path / argument) if argument in files else argument for argument in arguments]
     assert_ends_with_one_line(domain, arguments, expected)
 
 

@@ -121,7 +121,33 @@ def test_every_import_is_declared(arguments: dict[str, Any], manifest: ElementTr
 
 
 def test_ros_finds_what_pip_installs(arguments: dict[str, Any], manifest: ElementTree.Element) -> None:
-    without_key = {"mcap", "rosbags", "lz4", "zstandard", "setuptools"}  # left to pip, or there with Python
+    # rosdep's keys that are called otherwise, or whose package brings what is asked for.
+    keys_of = {
+        "rosbags": "python3-rosbags-pip",
+        "lz4": "python3-rosbags-pip",
+        "zstandard": "python3-rosbags-pip",
+        "mcap": "mcap-ros2-support",
+        "mujoco": "python3-mujoco-pip",
+    }
     keys = {element.text for element in manifest.findall("exec_depend")}
-    for name in {normal(name) for name in arguments["install_requires"]} - without_key:
-        assert f"python3-{name.removeprefix('py')}" in keys
+    asked = [*arguments["install_requires"], *arguments["extras_require"]["mujoco"]]
+    for name in {normal(name) for name in asked}:
+        assert keys_of.get(name, f"python3-{name.removeprefix('py')}") in keys, name
+
+
+def test_tests_import_nothing_that_ros_does_not_find(manifest: ElementTree.Element) -> None:
+    """`colcon test` runs after `rosdep install`: what a test imports at its top has a key, or the test is skipped."""
+    keys = {element.text for kind in ("exec_depend", "test_depend") for element in manifest.findall(kind)}
+    provided = {"rosbags": "python3-rosbags-pip", "mcap": "mcap-ros2-support", "yaml": "python3-yaml"}
+    own = {path.stem for path in (ROOT / "test").rglob("*.py")}
+    for path in (ROOT / "test").rglob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for node in tree.body:
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                names = [node.module or ""]
+            else:
+                continue
+            for name in {name.split(".")[0] for name in names} - set(sys.stdlib_module_names) - own - {PACKAGE.name}:
+                assert {name, f"python3-{name}", provided.get(name)} & keys, f"{path.name} imports {name}"

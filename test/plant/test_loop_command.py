@@ -30,6 +30,13 @@ def test_files_are_identical_when_repeated(
     assert (tmp_path / "one" / "loop.png").stat().st_size > 10_000
     tree = json.loads((tmp_path / "one" / "loop.json").read_text())
     assert [run["model"] for run in tree["runs"]] == ["3state_coop", "mujoco"]
+    ours, mujoco = tree["runs"]
+    # Free calcium in µM for the fibre's models, activation for MuJoCo's muscle: each under its own name.
+    assert ours["calcium_um"]["tibialis_anterior"] == pytest.approx(1e-3)
+    assert 0.3 < ours["calcium_um"]["soleus"] < 5.0
+    assert "activation" not in ours
+    assert mujoco["activation"]["tibialis_anterior"] == 0.0
+    assert "calcium_um" not in mujoco
     assert tree["platform"]["displacement_m"] == -0.075
     assert tree["tendon"] == "rigid"
     said = capsys.readouterr().out
@@ -75,3 +82,22 @@ def test_without_the_engine(
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "pip install 'xb_muscle_ros[mujoco]'" in said
+
+
+def test_a_fibre_beyond_its_lengths_is_told_once_with_the_time(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A body that is thrown over stretches its soleus further than any fibre goes."""
+    draw_nothing(monkeypatch)
+    thrown = ["--displacement", "-0.9", "--speed", "3", "--acceleration", "30"]
+    arguments = ["loop", "--model", "mujoco", "--duration", "0.5", *thrown, "--out", str(tmp_path)]
+    assert main(arguments) == 0
+    said = capsys.readouterr().err
+    assert said.count("beyond 0.5 to 1.5 L0") == 1
+    assert "mujoco: the fibre of soleus comes to 1.5" in said
+    text = (tmp_path / "loop.csv").read_text().splitlines()
+    column = text[0].split(",").index("soleus.length_change_l0")
+    first = next(row.split(",") for row in text[1:] if float(row.split(",")[column]) > 0.5)
+    assert f"from t = {float(first[1]):.3f} s on" in said
+    assert main(["loop", "--model", "mujoco", "--duration", "0.1", "--out", str(tmp_path)]) == 0
+    assert "beyond" not in capsys.readouterr().err

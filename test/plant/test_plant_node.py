@@ -148,3 +148,39 @@ def test_bad_parameters_end_with_code_2_and_one_line(stage: Stage, given: dict[s
     assert stage.processes["plant"].wait() == 2
     assert words in stage.log("plant")
     assert stage.log("plant").count("\n") == 1
+
+
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_a_body_that_falls_ends_its_episode_with_reason_code_and_last_state(stage: Stage, mode: str) -> None:
+    """No fibre can follow it any further; the node that would refuse its lengths is not asked for ever."""
+    stage.muscle("/e", mode)
+    stage.plant("/e", mode, displacement_m=-0.9, speed_m_per_s=3.0, acceleration_m_per_s2=30.0, duration_s=5.0)
+    assert stage.processes["plant/e"].wait(60.0) == 2
+    log = stage.log("plant/e")
+    assert "episode 1 ended before its time: the fibre of" in log
+    assert "beyond 0.5 to 1.5 L0" in log
+    assert "last state: t = " in log
+    assert "does not answer" not in log
+    assert "Traceback" not in log
+
+
+def test_a_muscle_node_that_takes_no_more_lengths_ends_the_episode(stage: Stage) -> None:
+    """Here another sender has moved its time on; the reason comes from its diagnostics."""
+    from xb_muscle_ros.node.link import Link
+
+    stage.muscle("/f", "lockstep")
+    with Link("meddler", "/f", stage.domain) as link:
+        link.find(10.0, "")
+        from sensor_msgs.msg import JointState
+
+        sender = link.node.create_publisher(JointState, "muscle/length", 10)
+        assert link.wait_for(lambda: sender.get_subscription_count() > 0, PATIENCE_S)
+        stage.plant("/f", "lockstep", displacement_m=-0.001)
+        stage.moves_on("/f", 50)
+        message = JointState(name=["soleus", "tibialis_anterior"], position=[0.05, 0.1])
+        message.header.stamp.sec = 3000
+        sender.publish(message)
+        assert stage.processes["plant/f"].wait(60.0) == 2
+    log = stage.log("plant/f")
+    assert "takes no more lengths" in log
+    assert "stamp not after the last" in log

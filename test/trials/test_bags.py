@@ -118,6 +118,7 @@ def test_metadata_is_what_rosbag2_writes(tmp_path: Path, trial: Trial, simulated
         assert profile["reliability"] == "reliable"
         assert profile["history"] == "keep_last"
         assert profile["durability"] == ("transient_local" if name == "/muscle/calcium" else "volatile")
+    assert info["ros_distro"] == "jazzy"
     assert info["custom_data"]["pca"] == "6.1"
     assert info["custom_data"]["amplitude_l0"] == "0.0383"
     assert all(isinstance(value, str) for value in info["custom_data"].values())

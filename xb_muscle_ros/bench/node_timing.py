@@ -20,8 +20,7 @@ def figures(duration_s: float, rate_hz: float, priority: int = 0) -> list[Figure
     settings = {"realtime_priority": priority, "lock_memory": priority > 0}
     ours, plain = run_beside_plain_timer(duration_s, rate_hz, settings=settings)
     name = f"{_prioritised('node', priority)}, {rate_hz:g} Hz for {duration_s:g} s"
-    made = _of_ticks(name, ours, duration_s * rate_hz)
-    return made + _of_ticks(f"plain timer beside {name}", plain, duration_s * rate_hz)
+    return _of_ticks(name, ours, rate_hz) + _of_ticks(f"plain timer beside {name}", plain, rate_hz)
 
 
 def roundtrip_figures(duration_s: float, rate_hz: float) -> list[Figure]:
@@ -47,24 +46,29 @@ def many_figures(duration_s: float, rate_hz: float, fibres: int, priority: int =
     settings = {"realtime_priority": priority, "lock_memory": priority > 0}
     realtime = run_timing(duration_s, rate_hz, fibres=fibres, settings=settings)
     lockstep = run_roundtrip(duration_s, rate_hz, fibres=fibres)
-    return _of_ticks(_prioritised(name, priority), realtime, duration_s * rate_hz) + _of_answers(
-        f"{name}, round trip", lockstep
-    )
+    return _of_ticks(_prioritised(name, priority), realtime, rate_hz) + _of_answers(f"{name}, round trip", lockstep)
 
 
 def _prioritised(name: str, priority: int) -> str:
     return f"{name} (SCHED_FIFO {priority})" if priority else name
 
 
-def _of_ticks(name: str, result: dict[str, float], due: float) -> list[Figure]:
+def _of_ticks(name: str, result: dict[str, float], rate_hz: float) -> list[Figure]:
     load = f"load {result['load']:.1f}"
     made = [
         Figure(f"{name}, lateness {key}", result[f"lateness_{key}_us"], "µs", None, f"the tick's deadline; {load}")
         for key in ("p50", "p99", "p99.9", "max")
     ]
+    due = f"{result['seconds'] * rate_hz:.0f} due in {result['seconds']:.2f} s"
     return [
         *made,
-        Figure(f"{name}, ticks", result["ticks"], "1", None, f"{due:.0f} due"),
+        Figure(
+            f"{name}, ticks",
+            result["ticks"],
+            "1",
+            None,
+            f"and {result['dropped_ticks']:.0f} dropped; {due}",
+        ),
         Figure(f"{name}, overruns", result["overruns"], "1", None, f"of them dropped {result['dropped_ticks']:.0f}"),
         Figure(f"{name}, state violations", result["state_violations"], "1", None, "0"),
         Figure(f"{name}, processor", 100.0 * result["cpu_share"], "%", None, "of one core"),

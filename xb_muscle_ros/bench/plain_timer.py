@@ -24,10 +24,47 @@ from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Array, Muscle
 from xb_muscle_ros.node.inlet import Inlet
 from xb_muscle_ros.node.inputs import Counts, length_change_l0, scale_of
-from xb_muscle_ros.node.lateness import Lateness
+from xb_muscle_ros.node.lateness import Lateness, LatenessSummary
 from xb_muscle_ros.node.outputs import OutputMessages
 from xb_muscle_ros.node.reporter import Reporter
 from xb_muscle_ros.node.status import Account, Status
+
+
+class Deadlines:
+    """What a timer that skips made of its deadlines: each is a call or skipped, and late either way."""
+
+    def __init__(self, period_ns: int) -> None:
+        self._lateness = Lateness()
+        self._calls = 0
+        self._period = period_ns
+        self._next: int | None = None
+        self._overruns = 0
+        self._skipped = 0
+
+    @property
+    def missed(self) -> tuple[int, int]:
+        """Deadlines that had passed before the timer was called for an earlier one, and those of them it skipped."""
+        return self._overruns, self._skipped
+
+    def summary(self) -> LatenessSummary:
+        """Lateness of all deadlines; a skipped one is as late as the next call. Ticks are the calls, as in the node."""
+        return self._lateness.summary()._replace(ticks=self._calls)
+
+    def met(self, now_ns: int, next_ns: int) -> None:
+        """The timer is called now (steady, ns), and will be called next for a deadline `next_ns`.
+
+        Which deadlines are skipped is for the timer to say: a call may be late by more than a period, and the next one
+        still be for the deadline in between.
+        """
+        due = next_ns - self._period if self._next is None else self._next
+        skipped = max(round((next_ns - due) / self._period) - 1, 0)
+        late = max(now_ns - due, 0)
+        for i in range(skipped + 1):
+            self._lateness.note(max(late - i * self._period, 0))
+        self._overruns += max(late // self._period, skipped)
+        self._skipped += skipped
+        self._calls += 1
+        self._next = next_ns
 
 
 class PlainTimer(Node):
@@ -51,7 +88,6 @@ class PlainTimer(Node):
         self._change: float | None = None
         self._calcium: float | None = None
         self._state: Array | None = None
-        self._deadline: int | None = None
         self._ticks = 0
         self._forget()
         self._reporter = Reporter(self, "plain timer")
@@ -74,28 +110,20 @@ class PlainTimer(Node):
 
     def status(self) -> Status:
         """How late timers were."""
-        return Status(self._ticks, 0, "", "", self._lateness.summary(), self._overruns, self._overruns)
+        return Status(self._ticks, 0, "", "", self._deadlines.summary(), *self._deadlines.missed)
 
     def _forget(self) -> None:
-        self._lateness = Lateness()
-        self._overruns = 0
+        self._deadlines = Deadlines(self._period)
 
     def _on_timer(self) -> None:
         now = time.monotonic_ns()
-        if self._deadline is None:
-            self._deadline = now + int(self._timer.time_until_next_call()) - self._period
-        late = now - self._deadline
-        missed = max(late // self._period, 0)
-        self._overruns += missed
-        # As for the node's own ticks: every deadline counts, the skipped ones too.
-        for i in range(missed + 1):
-            self._lateness.note(max(late - i * self._period, 0))
-        self._deadline += (missed + 1) * self._period
+        self._deadlines.met(now, now + int(self._timer.time_until_next_call()))
         if self._change is None or self._calcium is None:
             return
         if self._state is None:
             self._state = self._muscle.settle(self._change, self._calcium)
-            self._deadline = None
+            # Settling takes as long as it takes; deadlines count from its end.
+            self._forget()
             return
         self._state = self._muscle.step(self._state, self._change, self._calcium, self._period * 1e-9)
         self._ticks += 1

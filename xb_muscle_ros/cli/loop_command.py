@@ -56,6 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.files import matching, refuse_older
     from xb_muscle_ros.plant.loop import DURATION_S, run_ankle, run_knee
     from xb_muscle_ros.plant.plant import Plant
+    from xb_muscle_ros.plant.reach import beyond_in
     from xb_muscle_ros.plant.report import table, write
     from xb_muscle_ros.plant.translation import RampAndHold
 
@@ -103,6 +104,9 @@ def run(arguments: argparse.Namespace) -> int:
         else:
             traces = [run_knee(fibre, moved, duration, elastic) for moved in (False, True) for fibre in fibres]
         title = "Leg released from level"
+    for trace in traces:
+        if said := beyond_in(trace):
+            warn(said)
     print(table(traces))
     draw_loop(arguments.out / "loop.png", traces, f"{title}; {settings['tendon']} tendons")
     for path in [*write(arguments.out, traces, settings), arguments.out / "loop.png"]:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import os
 import sys
 from collections.abc import Sequence
 
-from xb_muscle_ros import __version__
+from xb_muscle_ros import __version__, programs
 from xb_muscle_ros.errors import UserError
 
 COMMANDS = (
@@ -47,15 +46,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("xb_muscle: interrupted", file=sys.stderr)
         return 130
-    except BrokenPipeError:
-        # Whoever read the output has left; point stdout elsewhere, so that the interpreter's last flush is quiet too.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 141
 
 
 def console() -> None:
     """Entry point of the installed script."""
-    sys.exit(main())
+    programs.run(main)
 
 
 if __name__ == "__main__":

@@ -8,8 +8,12 @@ from dataclasses import dataclass, field
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from xb_muscle_ros.models.registry import slack_of
+from xb_muscle_ros.node.inlet import Refused
 from xb_muscle_ros.node.inputs import Counts
 from xb_muscle_ros.node.status import Status
+
+# A refusal that has lasted this long is no hiccup, s.
+_LASTING_S = 1.0
 
 
 @dataclass
@@ -29,6 +33,10 @@ class Report:
         overruns_new, timeouts_new: since the last report.
         timeout_s: allowed age of the newest length sample; 0 for any.
         pushed: fibre and force (F0) of the strongest push since the last report; None where all pulled.
+        now_s: steady time of the report, s.
+        refusing: see `xb_muscle_ros.node.inlet.Door`.
+        lost: messages that did not come since the last reset, in words, by topic.
+        lost_new: how many since the last report, by topic.
     """
 
     node: str
@@ -48,6 +56,15 @@ class Report:
     timeouts_new: int = 0
     timeout_s: float = 0.0
     pushed: tuple[str, float] | None = None
+    now_s: float = 0.0
+    refusing: Mapping[tuple[str, str], Refused] = field(default_factory=dict)
+    lost: Mapping[str, str] = field(default_factory=dict)
+    lost_new: Mapping[str, int] = field(default_factory=dict)
+
+
+def status_name(node: str) -> str:
+    """Name of the node's status, as ROS has it: node, then task."""
+    return f"{node.lstrip('/')}: stepping"
 
 
 def diagnostics(report: Report) -> DiagnosticArray:
@@ -57,7 +74,7 @@ def diagnostics(report: Report) -> DiagnosticArray:
         status=[
             DiagnosticStatus(
                 level=level,
-                name=report.node.lstrip("/"),
+                name=status_name(report.node),
                 message=text,
                 hardware_id=report.fibre,
                 values=[KeyValue(key=key, value=value) for key, value in _values(report).items()],
@@ -85,8 +102,17 @@ def _verdict(report: Report) -> tuple[bytes, str]:
         remarks.append(f"no length {since}")
     elif report.timeouts_new:
         remarks.append(f"no length in time {report.timeouts_new} times")
+    lasting = [(*key, entry) for key, entry in report.refusing.items() if report.now_s - entry.since_s >= _LASTING_S]
+    for topic, whose, entry in lasting[:1]:
+        of, more = f" of {whose}" if whose else "", f" ({len(lasting) - 1} more likewise)" if lasting[1:] else ""
+        # While calcium is waited for there is nothing wrong with the length; one bad sample may have been the last.
+        if entry.times > 1 and not entry.text.startswith("waiting for calcium"):
+            level = DiagnosticStatus.ERROR
+        seconds = report.now_s - entry.since_s
+        remarks.append(f"no {topic}{of} taken for {seconds:.0f} s, newest refused: {entry.text}{more}")
     if refused:
         remarks.append(f"refused {refused} samples")
+    remarks += [f"lost {count} {topic} messages" for topic, count in report.lost_new.items() if count]
     if odd:
         remarks.append(f"odd input {odd} times")
     if report.overruns_new:
@@ -127,5 +153,6 @@ def _values(report: Report) -> Mapping[str, str]:
     values["refused"] = str(sum(report.refused.values()))
     values.update({f"refused: {reason}": str(count) for reason, count in sorted(report.refused.items())})
     values.update({f"odd: {reason}": str(count) for reason, count in sorted(report.odd.items())})
+    values.update({f"lost: {topic}": told for topic, told in report.lost.items()})
     values["ignored names"] = str(report.ignored_names)
     return values

@@ -62,11 +62,13 @@ class InletOfMany(Door):
         troubles += self._taker.take_length(stamp_ns(message.header.stamp), fibres, positions, velocities)
         if len(troubles) < places.fibres.size:
             self.last_length_s = time.monotonic()
+        if self.refusing:
+            self._taken("length", self._without(places, troubles))
         if troubles:
             self._tell("length", troubles)
 
-    def take_calcium(self, message: Any) -> None:
-        """Callback of ``muscle/calcium``: position µM."""
+    def take_calcium(self, message: Any, latched: bool = False) -> None:
+        """Callback of ``muscle/calcium``: position µM; `latched` as for `Inlet`."""
         if not self.open:
             return
         try:
@@ -85,7 +87,13 @@ class InletOfMany(Door):
                 except Refusal as refusal:
                     troubles.append(Trouble(int(fibres[k]), refusal))
             fibres, values = fibres[good], values[good]
-        troubles += self._taker.take_calcium(stamp_ns(message.header.stamp), fibres, values)
+        stamp = stamp_ns(message.header.stamp)
+        refused = self._taker.take_calcium(stamp, fibres, values)
+        if latched:
+            self._remember(stamp)
+        if self.refusing:
+            self._taken("calcium", self._without(places, [*troubles, *refused]))
+        troubles += [trouble for trouble in refused if not self._is_repeated(stamp, trouble.error, latched)]
         if troubles:
             self._tell("calcium", troubles)
 
@@ -94,6 +102,11 @@ class InletOfMany(Door):
         if places.new:
             self._ignore(places.new, f"fibres {enumerated(self._fibres)}")
         return places
+
+    def _without(self, places: Places, troubles: Sequence[Trouble]) -> list[str]:
+        """Names of the fibres of a message that are not among the troubled."""
+        bad = {trouble.fibre for trouble in troubles}
+        return [self._fibres[i] for i in places.fibres.tolist() if i not in bad]
 
     def _tell(self, topic: str, troubles: Sequence[Trouble]) -> None:
         """Count and say what is wrong, each reason once for all fibres that have it."""

@@ -109,16 +109,17 @@ class Names:
         return self._strangers.news(name for name in names if name != self._fibre)
 
 
-def checked(value: float, bounds: tuple[float, float], what: str, unit: str) -> float:
-    """Return a value within its bounds.
+def checked(value: float, bounds: tuple[float, float], what: str, unit: str, remedy: str = "") -> float:
+    """Return a value within its bounds; `remedy` ends what is said of one that is not.
 
     Raises:
         Refusal: not finite, or out of bounds.
     """
     if not math.isfinite(value):
-        raise Refusal("not finite", f"{what} is {value}")
+        raise Refusal("not finite", f"{what} is {value}; send finite numbers")
     if not bounds[0] <= value <= bounds[1]:
-        raise Refusal("out of range", f"{what} is {value:g} {unit}; allowed is {bounds[0]:g} to {bounds[1]:g} {unit}")
+        allowed = f"allowed is {bounds[0]:g} to {bounds[1]:g} {unit}"
+        raise Refusal("out of range", f"{what} is {value:g} {unit}; {allowed}{'; ' if remedy else ''}{remedy}")
     return value
 
 
@@ -129,7 +130,9 @@ def length_change_l0(position_m: float, scale: Scale) -> float:
         Refusal: see `checked`.
     """
     change = position_m / scale.reference_length_m - 1.0
-    return checked(change, LENGTH_CHANGE_L0, f"length change (position {position_m:g} m)", "L0")
+    what = f"length change (position {position_m:g} m)"
+    remedy = f"send m, with 1 L0 = {scale.reference_length_m:g} m (constants.reference_length_m)"
+    return checked(change, LENGTH_CHANGE_L0, what, "L0", remedy)
 
 
 def after(stamp: int, last: int | None, what: str) -> int:

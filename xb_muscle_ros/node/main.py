@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from types import FrameType
 
+from xb_muscle_ros import programs
 from xb_muscle_ros.errors import UserError
 
 USAGE = """\
@@ -37,8 +38,13 @@ def main(argv: Sequence[str] | None = None) -> None:
         argv: arguments without the program; those of the process where None.
 
     Raises:
-        SystemExit: code 2 after one line on stderr, where the user can mend something.
+        SystemExit: code 0, or 2 after one line on stderr, where the user can mend something.
     """
+    # Nothing but the help is printed. `ros2 run` complains of any other code, and then of the pipe itself.
+    programs.run(lambda: _main(argv), reader_left=0)
+
+
+def _main(argv: Sequence[str] | None) -> int:
     stop = _Stop()
     # Set here and not by rclpy, so that a signal ends the program quietly at any moment of its life, and so that SIGINT
     # counts even where a shell started the program in the background with SIGINT ignored.
@@ -48,7 +54,8 @@ def main(argv: Sequence[str] | None = None) -> None:
         _run([*(sys.argv[1:] if argv is None else argv)], stop)
     except UserError as error:
         print(f"muscle_node: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
+        return 2
+    return 0
 
 
 def _run(arguments: list[str], stop: _Stop) -> None:
@@ -70,7 +77,7 @@ def _run(arguments: list[str], stop: _Stop) -> None:
     except UserError:
         raise
     except Exception as error:
-        raise UserError(f"ROS arguments cannot be used: {_first_words(error)}{_hint(arguments)}") from error
+        raise UserError(f"ROS arguments cannot be used: {_first_words(error)}{_hint(arguments, str(error))}") from error
     try:
         _spin(stop)
     finally:
@@ -107,7 +114,9 @@ def _first_words(error: Exception) -> str:
     return text.split(", at ")[0]
 
 
-def _hint(arguments: list[str]) -> str:
+def _hint(arguments: list[str], error: str) -> str:
+    if "params file" in error:
+        return "; such a file has the node's full name or '/**' at its top, below it 'ros__parameters', then the names"
     # ROS' grammar of -p has no names with a part that starts with a digit; parameter files have.
     if any(re.match(r"[^:]*\.\d[^:]*:=", argument) for argument in arguments):
         return "; a name such as models.3state_coop.f can be given in a parameter file only, not with -p"

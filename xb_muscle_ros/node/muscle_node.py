@@ -13,8 +13,7 @@ from typing import Any
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.qos import QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
-from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
@@ -22,9 +21,11 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.node.graph import Namesakes, survive_wrong_transitions
 from xb_muscle_ros.node.inlet import Inlet
 from xb_muscle_ros.node.inlet_many import InletOfMany
 from xb_muscle_ros.node.inputs import scale_of
+from xb_muscle_ros.node.listening import Listening, overridable
 from xb_muscle_ros.node.lockstep import Lockstep
 from xb_muscle_ros.node.lockstep_many import LockstepMany
 from xb_muscle_ros.node.memory import lock_memory, unlock_memory
@@ -34,13 +35,8 @@ from xb_muscle_ros.node.priority import drop_priority, take_priority
 from xb_muscle_ros.node.realtime import Realtime, Settings
 from xb_muscle_ros.node.realtime_many import RealtimeMany
 from xb_muscle_ros.node.reporter import Reporter
-from xb_muscle_ros.node.saved_state import load_state, load_states, save_state, save_states
 from xb_muscle_ros.node.several import enumerated
-
-_DEEP = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
-_NEWEST = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
-# A lost sample breaks lockstep; in realtime an old one is worth less than none.
-_INPUT_QOS = {"lockstep": _DEEP, "realtime": _NEWEST}
+from xb_muscle_ros.node.state_file import StateFile
 
 _Many = LockstepMany | RealtimeMany
 
@@ -66,15 +62,22 @@ class MuscleNode(LifecycleNode):
         self._mode: str = self._gate.value("mode")
         self._stepping: Lockstep | Realtime | _Many | None = None
         self._inlet: Inlet | InletOfMany | None = None
+        self._listening: Listening | None = None
+        # While the program starts the node, the caller tells what is wrong.
+        self._starting = False
         self._entities: list[tuple[Any, Any]] = []
         self._reporter = Reporter(self, self._mode)
         self.create_service(Trigger, "~/reset", self._on_reset)
-        self.create_service(Trigger, "~/save_state", self._on_save)
-        self.create_service(Trigger, "~/load_state", self._on_load)
+        self._state_file = StateFile(
+            self._mode, lambda: str(self._gate.value("state_file")), lambda: self._stepping, self.get_logger()
+        )
+        self.create_service(Trigger, "~/save_state", self._state_file.on_save)
+        self.create_service(Trigger, "~/load_state", self._state_file.on_load)
+        self._namesakes = Namesakes(self)
         # The default timer would follow ROS time, which may stand still.
         self._clock_of_reports = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(1.0, self._report, clock=self._clock_of_reports)
-        self._survive_wrong_transitions()
+        survive_wrong_transitions(self)
 
     def autostart(self) -> None:
         """Configure and activate, if the parameter says so.
@@ -86,9 +89,11 @@ class MuscleNode(LifecycleNode):
             if self._gate.error is not None:
                 self.get_logger().error(str(self._gate.error))
             return
+        self._starting = True
         for transition in (self.trigger_configure, self.trigger_activate):
             if transition() != TransitionCallbackReturn.SUCCESS:
                 raise self.failure or UserError("the node could not be started; its log says why")
+        self._starting = False
 
     def close(self) -> None:
         """Stop stepping; the node can then be destroyed."""
@@ -100,6 +105,8 @@ class MuscleNode(LifecycleNode):
         try:
             fibres = self._gate.configure()
             self._connect(fibres)
+            if self._gate.value("load_state_at_start"):
+                self._state_file.load_at_start()
         except UserError as error:
             return self._fail(error)
         except Exception as error:
@@ -153,7 +160,7 @@ class MuscleNode(LifecycleNode):
 
     def _connect(self, fibres: Sequence[Fibre]) -> None:
         force, moments = (
-            self._outlet(self.create_lifecycle_publisher(JointState, topic, _output_qos(), **_overridable()))
+            self._outlet(self.create_lifecycle_publisher(JointState, topic, _output_qos(), **overridable()))
             for topic in ("muscle/force", "muscle/moments")
         )
         names = [fibre.name for fibre in fibres]
@@ -169,11 +176,8 @@ class MuscleNode(LifecycleNode):
             one = stepping = self._one(fibres[0], messages)
             inlet = Inlet(names[0], one, self.get_logger())
         self._stepping, self._inlet = stepping, inlet
-        # Calcium first: where both wait, it is then taken before the length that needs it.
-        for topic, take in (("muscle/calcium", inlet.take_calcium), ("muscle/length", inlet.take_length)):
-            made = self.create_subscription(JointState, topic, take, _INPUT_QOS[self._mode], **_overridable())
-            self._entities.append((made, self.destroy_subscription))
-        self._reporter.watch(fibres, stepping, inlet, outlet)
+        self._listening = Listening(self, inlet, self._mode)
+        self._reporter.watch(fibres, stepping, inlet, outlet, self._listening.arrivals)
 
     def _one(self, fibre: Fibre, messages: OutputMessages) -> Lockstep | Realtime:
         muscle = Muscle(fibre)
@@ -201,8 +205,8 @@ class MuscleNode(LifecycleNode):
 
     def _set_active(self, active: bool) -> None:
         self._gate.active = active
-        if self._inlet is not None:
-            self._inlet.open = active
+        if self._listening is not None:
+            self._listening.open(active)
 
     def _halt(self) -> None:
         self._set_active(False)
@@ -214,17 +218,19 @@ class MuscleNode(LifecycleNode):
             unlock_memory()
 
     def _free(self) -> None:
+        if self._listening is not None:
+            self._listening.close()
         for entity, destroy in self._entities:
             destroy(entity)
         self._entities.clear()
         self._reporter.forget()
         self._stepping = None
-        self._inlet = None
+        self._inlet = self._listening = None
         self._gate.release()
 
     def _fail(self, error: UserError) -> TransitionCallbackReturn:
         self.failure = error
-        if not self._gate.value("autostart"):
+        if not self._starting:
             self.get_logger().error(f"cannot be configured: {error}")
         self._free()
         return TransitionCallbackReturn.FAILURE
@@ -254,51 +260,19 @@ class MuscleNode(LifecycleNode):
             response.message = "the node is not configured; there is nothing to reset"
             return response
         account = self._stepping.reset()
+        if self._listening is not None:
+            self._listening.reset()
         response.success = True
         constants = _constants([*self._gate.fibres.values()])
         response.message = f"state forgotten after {account}; the next length sample settles anew; {constants}"
         return response
 
-    def _on_save(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._keep(response, load=False)
-
-    def _on_load(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._keep(response, load=True)
-
-    def _keep(self, response: Trigger.Response, load: bool) -> Trigger.Response:
-        file = self._gate.value("state_file")
-        try:
-            if self._stepping is None:
-                raise UserError("the node is not configured; configure it first")
-            if isinstance(self._stepping, _Many):
-                response.message = (load_states if load else save_states)(file, self._mode, self._stepping)
-            else:
-                response.message = (load_state if load else save_state)(file, self._mode, self._stepping)
-            response.success = True
-            self.get_logger().info(response.message)
-        except UserError as error:
-            response.message = str(error)
-            self.get_logger().error(response.message)
-        return response
-
     def _report(self) -> None:
         label = self._state_machine.current_state[1]
         self._reporter.report(label, time.monotonic(), self._gate.value("timeout_s"))
-
-    def _survive_wrong_transitions(self) -> None:
-        """Answer a transition that is not allowed here with failure; rclpy would end the process over it."""
-        service = self._service_change_state
-        answer = service.callback
-
-        def safely(request: Any, response: Any) -> Any:
-            try:
-                return answer(request, response)
-            except Exception as error:
-                self.get_logger().warning(" ".join(f"transition refused: {error}".split()))
-                response.success = False
-                return response
-
-        service.callback = safely
+        self._namesakes.look()
+        if self._listening is not None:
+            self._listening.look()
 
 
 def _constants(fibres: Sequence[Fibre]) -> str:
@@ -312,8 +286,3 @@ def _constants(fibres: Sequence[Fibre]) -> str:
 
 def _output_qos() -> QoSProfile:
     return QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
-
-
-def _overridable() -> dict[str, Any]:
-    kinds = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
-    return {"qos_overriding_options": QoSOverridingOptions(kinds)}

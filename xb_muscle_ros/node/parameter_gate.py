@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -14,8 +14,8 @@ from rclpy.parameter import Parameter
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre, fibre_from_parameters
-from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked
-from xb_muscle_ros.node.configuration import GROUPS, WHERE, configure, configure_many
+from xb_muscle_ros.node.configuration import WHERE, Configured, configure, configure_many, said_by_files
+from xb_muscle_ros.node.foreign_keys import foreign_keys, ignored
 from xb_muscle_ros.node.parameters import (
     INACTIVE,
     NODE_PARAMETERS,
@@ -23,11 +23,13 @@ from xb_muscle_ros.node.parameters import (
     START,
     TEXTS,
     UNCONFIGURED,
+    check_fibre_parameter,
     check_node_parameter,
     fibre_descriptor,
     is_fibre_parameter,
     is_foreign,
     is_text,
+    meant_as_number,
     node_descriptor,
     unknown,
 )
@@ -65,17 +67,18 @@ class ParameterGate:
         self._own_hand = False
         # Of every fibre, by the same prefix, then by flat name.
         self._values: dict[str, dict[str, object]] = {}
+        # The same as the fibres' files alone have it.
+        self._of_file: dict[str, Mapping[str, object]] = {}
         self._derived: list[str] = []
+        self._earlier: set[str] = set()
         self._given: dict[str, object] = {}
-        overrides: dict[str, object] = {}
-        for name, parameter in node.get_parameters_by_prefix("").items():
-            if not is_foreign(name):
-                overrides[name] = parameter.value
-                node.undeclare_parameter(name)
+        came = node.get_parameters_by_prefix("").items()
+        overrides: dict[str, object] = {name: p.value for name, p in came if not is_foreign(name)}
+        for name in overrides:
+            node.undeclare_parameter(name)
         self._declare_own(overrides)
-        for name, value in overrides.items():
-            if is_fibre_parameter(name):
-                self._give(name, value)
+        for name, value in self._own_of(overrides).items():
+            self._give(name, value)
         for name in TEXTS:
             if not node.has_parameter(name):
                 self._declare(name, "")
@@ -101,8 +104,10 @@ class ParameterGate:
         if self.error is not None:
             raise self.error
         made = self._made()
-        self.fibres = {prefix: fibre for prefix, (fibre, _) in made.items()}
-        self._values = {prefix: values for prefix, (_, values) in made.items()}
+        self.fibres = {prefix: one.fibre for prefix, one in made.items()}
+        self._values = {prefix: one.values for prefix, one in made.items()}
+        self._of_file = {prefix: one.of_file for prefix, one in made.items()}
+        self._leave_to_the_files()
         with self._by_own_hand():
             for name, value in self._declared().items():
                 if self._node.has_parameter(name):
@@ -112,15 +117,16 @@ class ParameterGate:
                     self._derived.append(name)
         return list(self.fibres.values())
 
-    def _made(self) -> Mapping[str, tuple[Fibre, dict[str, object]]]:
+    def _made(self) -> Mapping[str, Configured]:
         file: str = self.value("fiber_file")
         if not self.many:
-            return {"": configure(file, self._given)}
+            return {"": configure(file, self._given, self._node.get_fully_qualified_name())}
         names, files = ([*filter(None, self.value(name))] for name in ("fibers", "fiber_files"))
         if bool(files) == bool(file):
             found = "both" if file else "none"
             raise UserError(f"many fibres need 'fiber_files', or 'fiber_file' for all of them, found {found}; give one")
-        made = configure_many(names, files or [file] * len(names), self._given)
+        made = configure_many(names, files or [file] * len(names), self._given, self._ignore, self._earlier)
+        self._earlier |= {*made}
         return {f"{name}.": pair for name, pair in made.items()}
 
     def _declared(self) -> dict[str, object]:
@@ -137,8 +143,10 @@ class ParameterGate:
 
     def release(self) -> None:
         """Back to what was given; parameters that came from a file are no longer declared."""
+        self._leave_to_the_files()
         self.fibres = {}
         self._values = {}
+        self._of_file = {}
         with self._by_own_hand():
             for name in self._derived:
                 if self._node.has_parameter(name):
@@ -156,15 +164,35 @@ class ParameterGate:
                     self.error = self.error or error
             self._node.declare_parameter(name, value, node_descriptor(name), ignore_override=True)
 
+    def _own_of(self, overrides: Mapping[str, object]) -> dict[str, object]:
+        """What was given for fibres; keys of other nodes are left out."""
+        names = [name for name in overrides if is_fibre_parameter(name)]
+        foreign: list[str] = []
+        try:
+            # What has a dot may be of one of many fibres, whose names are known when configuring.
+            foreign = foreign_keys([n for n in names if not (self.many and "." in n)], {*NODE_PARAMETERS, *TEXTS})
+        except UserError as error:
+            self.error = self.error or error
+        if foreign:
+            self._ignore(foreign)
+        return {name: overrides[name] for name in names if name not in foreign}
+
+    def _ignore(self, names: Sequence[str]) -> None:
+        self._node.get_logger().warning(ignored(names, self._node.get_fully_qualified_name()))
+        for name in names:
+            self._given.pop(name, None)
+
+    def _leave_to_the_files(self) -> None:
+        """Forget what was given where a fibre's file says the same: with another file it would hide what that says."""
+        for name in said_by_files(self._given, self._of_file):
+            del self._given[name]
+            if self._node.has_parameter(name) and name not in TEXTS:
+                self._derived.append(name)
+
     def _give(self, name: str, value: object) -> None:
-        head, _, rest = name.partition(".")
-        # What begins with another name may be of one of many fibres, whose names are known when configuring.
-        if not is_text(name) and not (rest and (head in ("constants", "models") or self.many)):
-            self.error = self.error or unknown(name, ("constants", "models"))
-            return
         self._given[name] = str(value) if is_text(name) else value
         try:
-            value = str(value) if is_text(name) else self._checked(name, value)
+            value = str(value) if is_text(name) else check_fibre_parameter(name, value)
             self._declare(name, value)
         except UserError:
             # Configuring will say what is wrong with it, with the whole set at hand.
@@ -172,14 +200,6 @@ class ParameterGate:
 
     def _declare(self, name: str, value: object) -> None:
         self._node.declare_parameter(name, value, fibre_descriptor(name), ignore_override=True)
-
-    def _checked(self, name: str, value: object) -> float:
-        head, _, rest = name.partition(".")
-        if head not in GROUPS and rest:
-            head, _, rest = rest.partition(".")
-        if head == "constants":
-            return checked(rest, value, CONSTANTS, WHERE)
-        return checked(rest.rpartition(".")[2], value, PARAMETERS, WHERE)
 
     @contextmanager
     def _by_own_hand(self) -> Iterator[None]:
@@ -195,10 +215,8 @@ class ParameterGate:
             name = parameter.name
             if not self._node.has_parameter(name):
                 raise _Unknown(unknown(name, self._node.get_parameters_by_prefix("")))
-            whole = parameter.type_ == Parameter.Type.INTEGER
-            if whole and self._node.get_parameter(name).type_ == Parameter.Type.DOUBLE:
-                # On a command line 80 is meant as 80.0.
-                parameter = Parameter(name, value=float(parameter.value))
+            if self._node.get_parameter(name).type_ == Parameter.Type.DOUBLE:
+                parameter = meant_as_number(parameter)
             made.append(parameter)
         return made
 
@@ -210,8 +228,8 @@ class ParameterGate:
             for parameter in parameters:
                 name, value = parameter.name, parameter.value
                 if name in NODE_PARAMETERS:
-                    check_node_parameter(name, value)
-                    self._check_moment(name, NODE_PARAMETERS[name].when)
+                    if check_node_parameter(name, value) != check_node_parameter(name, self.value(name)):
+                        self._check_moment(name, NODE_PARAMETERS[name].when)
                 elif is_fibre_parameter(name):
                     physical[name] = value
             self._check_fibre(physical)
@@ -230,7 +248,7 @@ class ParameterGate:
         if not self.fibres:
             for name, value in new.items():
                 if not is_text(name):
-                    self._checked(name, value)
+                    check_fibre_parameter(name, value)
             return
         for prefix, values in self._by_fibre(new).items():
             old = self._values[prefix]
@@ -267,12 +285,16 @@ class ParameterGate:
         if self._own_hand:
             return
         physical = {p.name: p.value for p in parameters if is_fibre_parameter(p.name)}
-        if self.fibres:
-            for prefix, values in self._by_fibre(physical).items():
-                self._values[prefix].update(values)
-                fibre = self.fibres[prefix] = fibre_from_parameters(self._values[prefix], WHERE)
+        for prefix, values in self._by_fibre(physical).items() if self.fibres else ():
+            old = self._values[prefix]
+            new = {name: value for name, value in values.items() if value != old.get(name)}
+            if new:
+                old.update(new)
+                fibre = self.fibres[prefix] = fibre_from_parameters(old, WHERE)
                 self.on_fibre([*self.fibres].index(prefix), fibre)
-        if "" in self.fibres or not self.fibres:
+            # What is set to what it is, as by loading a dump, is still the file's.
+            self._given.update({f"{prefix}{name}": value for name, value in new.items()})
+        if not self.fibres:
             self._given.update(physical)
         if any(p.name in NODE_PARAMETERS for p in parameters):
             self.on_settings()

@@ -1,17 +1,20 @@
 """The node's own parameters, one row each, and the descriptors that ROS tools show."""
 
+# mypy: allow-untyped-calls
+
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.parameter import Parameter
 
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS
-from xb_muscle_ros.node.configuration import GROUPS
+from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked
+from xb_muscle_ros.node.foreign_keys import GROUPS
 from xb_muscle_ros.node.watchdog import DECAY, HOLD, ISOMETRIC
 
 Value = bool | int | float | str | tuple[str, ...]
@@ -79,6 +82,9 @@ NODE_PARAMETERS: Mapping[str, Row] = MappingProxyType(
         ),
         "lock_memory": Row(False, "", "keep the process in memory while active, where permitted", INACTIVE),
         "state_file": Row("", "", "file that ~/save_state writes and ~/load_state reads", ALWAYS),
+        "load_state_at_start": Row(
+            False, "", "when configuring go on with the state in state_file, as ~/load_state does", UNCONFIGURED
+        ),
     }
 )
 
@@ -146,6 +152,20 @@ def check_value(name: str, row: Row, value: object) -> Value:
     return value
 
 
+def check_fibre_parameter(name: str, value: object) -> float:
+    """Return a number for a parameter of the fibre, such as ``models.3state_coop.f``, or of one of many.
+
+    Raises:
+        UserError: the name is not known, or the value not allowed.
+    """
+    head, _, rest = name.partition(".")
+    if head not in GROUPS and rest:
+        head, _, rest = rest.partition(".")
+    if head == "constants":
+        return checked(rest, value, CONSTANTS, "parameters")
+    return checked(rest.rpartition(".")[2], value, PARAMETERS, "parameters")
+
+
 def _texts(name: str, value: object) -> tuple[str, ...]:
     """A list of texts; an empty list has no type in ROS and reads as one empty text."""
     if isinstance(value, Sequence) and not isinstance(value, str) and all(isinstance(text, str) for text in value):
@@ -154,6 +174,21 @@ def _texts(name: str, value: object) -> tuple[str, ...]:
 
 
 _KINDS = {bool: "bool", int: "whole number", float: "number", str: "text"}
+
+
+def meant_as_number(parameter: Any) -> Any:
+    """A parameter for a number, given as ROS' tools give some of them.
+
+    On a command line 80 is meant as 80.0; a dump has 1e-05, without a point, and loading takes that for text.
+    """
+    if parameter.type_ == Parameter.Type.INTEGER:
+        return Parameter(parameter.name, value=float(parameter.value))
+    if parameter.type_ == Parameter.Type.STRING:
+        try:
+            return Parameter(parameter.name, value=float(parameter.value))
+        except ValueError:
+            return parameter
+    return parameter
 
 
 def unknown(name: str, declared: Iterable[str]) -> UserError:

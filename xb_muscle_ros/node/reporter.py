@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 from diagnostic_msgs.msg import DiagnosticArray
 
 from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.node.arrivals import Arrivals
 from xb_muscle_ros.node.diagnostics import Report, diagnostics
+from xb_muscle_ros.node.inlet import Refused
 from xb_muscle_ros.node.inputs import Counts
 from xb_muscle_ros.node.several import enumerated
 from xb_muscle_ros.node.status import Status
@@ -32,6 +34,7 @@ class Inlet(Protocol):
     refused: Counts
     ignored_names: int
     last_length_s: float | None
+    refusing: dict[tuple[str, str], Refused]
 
 
 class Outlet(Protocol):
@@ -51,10 +54,20 @@ class Reporter:
         self._stepping: Stepping | None = None
         self._inlet: Inlet | None = None
         self._outlet: Outlet | None = None
+        self._arrivals: Mapping[str, Arrivals] = {}
+        self._lost: dict[str, int] = {}
         self._last = (time.monotonic(), time.process_time(), 0, 0, 0)
 
-    def watch(self, fibres: Sequence[Fibre], stepping: Stepping, inlet: Inlet, outlet: Outlet) -> None:
-        """Report on these from now on."""
+    def watch(
+        self,
+        fibres: Sequence[Fibre],
+        stepping: Stepping,
+        inlet: Inlet,
+        outlet: Outlet,
+        arrivals: Mapping[str, Arrivals] = {},
+    ) -> None:
+        """Report on these from now on; `arrivals` by topic."""
+        self._arrivals = arrivals
         self._report.fibre = enumerated([fibre.name for fibre in fibres])
         self._report.fibres, self._report.model = len(fibres), fibres[0].model
         self._stepping, self._inlet, self._outlet = stepping, inlet, outlet
@@ -63,6 +76,7 @@ class Reporter:
     def forget(self) -> None:
         """There is nothing to report on but the node itself."""
         self._stepping = self._inlet = self._outlet = None
+        self._arrivals = {}
         self._report = Report(self._report.node, self._mode, "unconfigured")
 
     def report(self, state: str, now_s: float, timeout_s: float) -> None:
@@ -86,8 +100,14 @@ class Reporter:
             report.ignored_names = self._inlet.ignored_names
             last = self._inlet.last_length_s
             report.input_age_s = None if last is None else now_s - last
+            report.refusing = self._inlet.refusing
         if self._outlet is not None:
             report.pushed, self._outlet.pushed = self._outlet.pushed, None
+        report.now_s = now_s
+        report.lost = {topic: arrivals.told() for topic, arrivals in self._arrivals.items()}
+        lost = {topic: arrivals.lost for topic, arrivals in self._arrivals.items()}
+        report.lost_new = {topic: max(count - self._lost.get(topic, 0), 0) for topic, count in lost.items()}
+        self._lost = lost
         message = diagnostics(report)
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)

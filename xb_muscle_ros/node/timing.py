@@ -12,32 +12,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.node.inputs import stamp_ns
 from xb_muscle_ros.node.link import Link
+from xb_muscle_ros.node.measured import START_S, Measured
 from xb_muscle_ros.node.outputs import room
 from xb_muscle_ros.node.process import NodeProcess, private_domain
 from xb_muscle_ros.node.waiting import make_waiter
 
 _INPUT_HZ = 500.0
-_START_S = 60.0
 PLAIN = "xb_muscle_ros.bench.plain_timer"
 """Module of the node with an executor's timer that ours is held against."""
-_KEYS = {
-    "ticks since reset": "ticks",
-    "lateness p50 (µs)": "lateness_p50_us",
-    "lateness p99 (µs)": "lateness_p99_us",
-    "lateness p99.9 (µs)": "lateness_p99.9_us",
-    "lateness max (µs)": "lateness_max_us",
-    "overruns": "overruns",
-    "dropped ticks": "dropped_ticks",
-    "state violations": "state_violations",
-    "refused": "refused",
-}
 
 
 def run_timing(
@@ -63,7 +51,7 @@ def run_timing(
     domain = private_domain()
     parameters = {**_parameters(fibre, fibres, "realtime", rate_hz), **settings}
     with NodeProcess(domain, parameters) as child, Link("timing", domain_id=domain) as link:
-        return _measure([_Measured(link, child)], duration_s, names(fibres))[0]
+        return _measure([Measured(link, child)], duration_s, names(fibres))[0]
 
 
 def run_beside_plain_timer(
@@ -82,7 +70,7 @@ def run_beside_plain_timer(
         Link("timing", domain_id=domain) as near,
         Link("timing", "/plain", domain) as far,
     ):
-        first, second = _measure([_Measured(near, ours), _Measured(far, theirs)], duration_s, names(1))
+        first, second = _measure([Measured(near, ours), Measured(far, theirs)], duration_s, names(1))
     return first, second
 
 
@@ -108,7 +96,7 @@ def run_roundtrip(duration_s: float, rate_hz: float, fibre: str = "18Dec2017a", 
         NodeProcess(domain, _parameters(fibre, fibres, "lockstep", rate_hz)) as child,
         Link("timing", domain_id=domain) as link,
     ):
-        measured = _Measured(link, child)
+        measured = Measured(link, child)
         pinger = _Pinger(link, names(fibres))
         measured.find()
         pinger.meet()
@@ -133,55 +121,7 @@ def _parameters(fibre: str, fibres: int, mode: str, rate_hz: float) -> dict[str,
     return given
 
 
-class _Measured:
-    """A node and what it says of itself."""
-
-    def __init__(self, link: Link, child: NodeProcess) -> None:
-        self.link = link
-        self.child = child
-        self.reports: list[dict[str, str]] = []
-        self._diagnostics = link.node.create_subscription(
-            DiagnosticArray, "/diagnostics", lambda message: self.reports.extend(_reports(message, link.peer)), 10
-        )
-
-    def find(self) -> None:
-        """Wait for the node.
-
-        Raises:
-            UserError: it does not come.
-        """
-        try:
-            self.link.find(_START_S, "see the log")
-        except UserError as error:
-            raise UserError(f"the node to be measured did not start: {self.child.log() or error}") from error
-
-    def stepping(self) -> bool:
-        """Whether it has reported steps."""
-        return bool(self.reports) and float(self.reports[-1]["rate (Hz)"]) > 0.0
-
-    def close(self) -> None:
-        """Listen no more."""
-        self.link.node.destroy_subscription(self._diagnostics)
-
-    def figures(self) -> dict[str, float]:
-        """Of the time since reports were cleared.
-
-        Raises:
-            UserError: too few reports came.
-        """
-        if len(self.reports) < 2:
-            raise UserError(
-                f"only {len(self.reports)} reports came from the node to be measured; measure for 3 s at least"
-            )
-        measured = {key: float(self.reports[-1][name]) for name, key in _KEYS.items()}
-        # The first report reaches back before the reset.
-        later = self.reports[1:]
-        measured["rate_hz"] = sum(float(report["rate (Hz)"]) for report in later) / len(later)
-        measured["cpu_share"] = sum(float(report["CPU (share of one core)"]) for report in later) / len(later)
-        return measured
-
-
-def _measure(nodes: Sequence[_Measured], duration_s: float, fibres: Sequence[str]) -> list[dict[str, float]]:
+def _measure(nodes: Sequence[Measured], duration_s: float, fibres: Sequence[str]) -> list[dict[str, float]]:
     """Feed nodes and read their figures."""
     for node in nodes:
         node.find()
@@ -191,11 +131,10 @@ def _measure(nodes: Sequence[_Measured], duration_s: float, fibres: Sequence[str
         for feeder in feeders:
             feeder.start()
         for node in nodes:
-            if not node.link.wait_for(node.stepping, _START_S):
+            if not node.link.wait_for(node.stepping, START_S):
                 raise UserError(f"the node to be measured does not step: {node.child.log()}")
         for node in nodes:
-            node.link.reset()
-            node.reports.clear()
+            node.begin()
         end = time.monotonic() + duration_s + 1.0
         while (rest := end - time.monotonic()) > 0.0:
             for node in nodes:
@@ -230,7 +169,7 @@ class _Pinger:
         Raises:
             UserError: none does.
         """
-        end = time.monotonic() + _START_S
+        end = time.monotonic() + START_S
         while time.monotonic() < end:
             self._link.reset()
             self._send(self._calcium, 0, 5.0)
@@ -284,11 +223,6 @@ class _Pinger:
     def _on_force(self, message: JointState) -> None:
         if len(message.effort) == self._count:
             self._answered = (stamp_ns(message.header.stamp), time.monotonic_ns())
-
-
-def _reports(message: Any, node: str) -> list[dict[str, str]]:
-    own = [status for status in message.status if f"/{status.name}" == node]
-    return [{pair.key: pair.value for pair in status.values} for status in own]
 
 
 class _Feeder:

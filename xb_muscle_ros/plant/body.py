@@ -8,6 +8,7 @@ from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.plant.drives import FibreDrive, without_parallel
 from xb_muscle_ros.plant.junction import Junction
 from xb_muscle_ros.plant.plant import Array, Plant
+from xb_muscle_ros.plant.reach import beyond
 from xb_muscle_ros.plant.translation import RampAndHold
 
 
@@ -60,6 +61,20 @@ class Body:
     def velocity_l0_per_s(self) -> Array:
         """Their rates."""
         return self.plant.velocity_l0_per_s() if self._junction is None else self._junction.velocity_l0_per_s
+
+    @property
+    def beyond(self) -> str:
+        """Which muscle's fibre is asked for a length that no fibre has; empty where none is."""
+        return beyond([muscle.name for muscle in self.plant.muscles], self.length_l0)
+
+    @property
+    def state(self) -> str:
+        """Where the body is, in words."""
+        plant = self.plant
+        return (
+            f"t = {self.tick * plant.tick_s:.3f} s, angle {plant.angle_rad:.4f} rad, "
+            f"velocity {plant.velocity_rad_per_s:.4f} rad/s, torque of the muscles {self.torque_nm:.4g} N·m"
+        )
 
     def advance(self, force_f0: Array) -> None:
         """Go on by one tick with the fibres' forces (F0) at the lengths of now."""

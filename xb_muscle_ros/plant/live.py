@@ -12,6 +12,7 @@ from xb_muscle_ros.plant.junction import Junction
 from xb_muscle_ros.plant.loop import DURATION_S, Trace, couple, move
 from xb_muscle_ros.plant.muscle_end import MuscleEnd
 from xb_muscle_ros.plant.plant import Array, Plant
+from xb_muscle_ros.plant.reach import beyond
 from xb_muscle_ros.plant.translation import RampAndHold
 
 _ANSWER_S = 10.0
@@ -63,12 +64,19 @@ class LiveDrive:
             if self._junction is not None:
                 self._junction.advance(path, self._force, plant.tick_s)
             stamp = round(self._tick * plant.tick_s * 1e9)
+            said = beyond([muscle.name for muscle in plant.muscles], self.fibre_length_l0())
+            if said:
+                raise UserError(
+                    f"the run ends at t = {1e-9 * stamp:.3f} s, angle {plant.angle_rad:.4f} rad: {said}, which the "
+                    "node refuses; take a shorter --duration or a smaller --displacement"
+                )
             self._end.send_length(stamp, path if self._junction is None else self._junction.length_l0)
             force = self._end.force(stamp, _ANSWER_S)
             if force is None:
+                why = self._end.trouble or "see its log"
                 raise UserError(
                     f"node {self._link.peer} did not answer the length at t = {1e-9 * stamp:g} s within "
-                    f"{_ANSWER_S:g} s; see its log"
+                    f"{_ANSWER_S:g} s; {why}"
                 )
             self._force = force
         self._tick += 1

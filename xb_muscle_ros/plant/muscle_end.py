@@ -8,11 +8,13 @@ import time
 from collections.abc import Mapping
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.node.diagnostics import status_name
 from xb_muscle_ros.node.inputs import stamp_ns
 from xb_muscle_ros.node.link import Link
 from xb_muscle_ros.plant.plant import Architecture, Array
@@ -29,6 +31,8 @@ class MuscleEnd:
     Attributes:
         forces: F0, shape (muscle,), by stamp (ns), until taken.
         newest: the newest of them and when it arrived (steady, s); None before the first.
+        trouble: what the node's diagnostics said last, where that was not that all is well.
+        stuck: whether that is an error, which no further length will mend.
     """
 
     def __init__(self, link: Link, muscles: tuple[Architecture, ...], fibre: Fibre, mode: str) -> None:
@@ -42,6 +46,8 @@ class MuscleEnd:
         """
         self.forces: dict[int, Array] = {}
         self.newest: tuple[Array, float] | None = None
+        self.trouble = ""
+        self.stuck = False
         self._link = link
         self._fibre = fibre
         self._mode = mode
@@ -51,7 +57,10 @@ class MuscleEnd:
         qos = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
         self._length = link.node.create_publisher(JointState, "muscle/length", qos)
         self._calcium = link.node.create_publisher(JointState, "muscle/calcium", qos)
-        self._inlet = link.node.create_subscription(JointState, "muscle/force", self._on_force, qos)
+        self._inlets = (
+            link.node.create_subscription(JointState, "muscle/force", self._on_force, qos),
+            link.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10),
+        )
 
     @property
     def command(self) -> str:
@@ -135,6 +144,12 @@ class MuscleEnd:
         message = JointState(name=self._names, position=values.tolist())
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
         return message
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if self._link.peer and status.name == status_name(self._link.peer):
+                self.trouble = "" if status.level == DiagnosticStatus.OK else status.message
+                self.stuck = status.level == DiagnosticStatus.ERROR
 
     def _on_force(self, message: JointState) -> None:
         if list(message.name) == self._names:

@@ -7,11 +7,13 @@ from __future__ import annotations
 import signal
 import sys
 import time
-from collections.abc import Callable, Mapping
-from types import FrameType, MappingProxyType
+from collections.abc import Callable
+from types import FrameType
 from typing import Any
 
-from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros import programs
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.plant.plant_parameters import read
 
 USAGE = """\
 usage: plant_node --ros-args [-p NAME:=VALUE]... [-r __ns:=/NAMESPACE]
@@ -26,27 +28,8 @@ _FIND_S = 2.0
 _CALCIUM_EVERY = 50
 
 
-def parameters() -> Mapping[str, Any]:
-    """Rows of the node's parameters, all of which are read at the start only."""
-    from xb_muscle_ros.node.parameters import START, Row
-
-    return MappingProxyType(
-        {
-            "scene": Row("ankle", "", "what to move", START, choices=("ankle", "knee")),
-            "mode": Row(
-                "lockstep", "", "of the muscle node and so of this one", START, choices=("lockstep", "realtime")
-            ),
-            "fiber_file": Row("18Dec2017a", "", "fibre file, path or packaged fibre name", START),
-            "model": Row("3state_coop", "", "parameter set of the fibre file", START),
-            "elastic_tendon": Row(False, "", "tendons stretch", START),
-            "duration_s": Row(1.0, "s", "length of an episode; then all starts anew", START, 0.01, 3600.0),
-            "episodes": Row(0, "", "how many; 0: until stopped", START, 0, 10**9),
-            "displacement_m": Row(-0.075, "m", "of the platform in the scene ankle", START, -1.0, 1.0),
-            "speed_m_per_s": Row(0.2, "m/s", "of the platform", START, 1e-3, 5.0),
-            "acceleration_m_per_s2": Row(2.0, "m/s²", "of the platform", START, 1e-2, 50.0),
-            "timeout_s": Row(0.5, "s", "age of the force beyond which the body waits for it", START, 0.01, 3600.0),
-        }
-    )
+class _EpisodeOver(UserError):
+    """An episode that cannot go on, whoever is waited for."""
 
 
 class PlantNode:
@@ -70,7 +53,7 @@ class PlantNode:
         from xb_muscle_ros.plant.muscle_end import MuscleEnd
         from xb_muscle_ros.plant.translation import RampAndHold
 
-        given = _read(node)
+        given = read(node)
         self._mode: str = given["mode"]
         self._episodes: int = given["episodes"]
         self._timeout_s: float = given["timeout_s"]
@@ -89,25 +72,42 @@ class PlantNode:
         self._said = ""
         # Of the realtime thread: ticks until the muscles have settled, and whether the body waits for force.
         self._settling = 0
+        self._played = 0
+        self._fallen = False
         self._waiting_since: float | None = None
 
     def run(self) -> None:
-        """Play."""
-        played = 0
-        while not self._stop() and (self._episodes == 0 or played < self._episodes):
+        """Play.
+
+        Raises:
+            UserError: an episode came to an end before its time.
+        """
+        while not self._stop() and (self._episodes == 0 or self._played < self._episodes):
             self._body.restart()
             self._play_lockstep() if self._mode == "lockstep" else self._play_realtime()
-            played += 1
+            self._played += 1
 
     def close(self) -> None:
         """Leave the graph."""
         self._link.close()
+
+    def _ended(self, why: str) -> _EpisodeOver:
+        """What to say of an episode that cannot go on."""
+        return _EpisodeOver(f"episode {self._played + 1} ended before its time: {why}; last state: {self._body.state}")
+
+    def _check_reach(self) -> None:
+        if said := self._body.beyond:
+            raise self._ended(
+                f"{said}, so no muscle can answer; take a shorter duration_s or a gentler movement of the platform"
+            )
 
     def _insist(self, act: Callable[[], Any]) -> Any:
         """Result of something that a muscle node must be there for, tried until it is; None where told to stop."""
         while not self._stop():
             try:
                 result = act()
+            except _EpisodeOver:
+                raise
             except UserError as error:
                 if str(error) != self._said:
                     self._said = str(error)
@@ -132,6 +132,7 @@ class PlantNode:
             body.advance(force)
             if body.tick >= self._ticks:
                 return
+            self._check_reach()
             force = self._answer(round(body.tick * body.plant.tick_s * 1e9))
 
     def _answer(self, stamp: int) -> Any:
@@ -147,9 +148,12 @@ class PlantNode:
             # Another node may have taken its place: it knows neither parameters nor calcium.
             if end.find(_FIND_S):
                 self._link.reset()
+                end.stuck = False
             end.send_calcium(stamp, body.calcium_um)
             end.send_length(stamp, body.length_l0, body.velocity_l0_per_s)
             found = end.force(stamp, 1.0)
+            if found is None and end.stuck:
+                raise self._ended(f"node {self._link.peer} takes no more lengths ({end.trouble})")
             if found is None:
                 raise UserError(f"node {self._link.peer} does not answer")
             return found
@@ -178,12 +182,16 @@ class PlantNode:
         try:
             while not self._stop() and self._body.tick < self._ticks:
                 self._link.wait_for(lambda: self._body.tick >= self._ticks, 0.1)
+                if self._fallen:
+                    break
                 since = self._waiting_since
                 if since is not None and time.monotonic() - since > _FIND_S:
                     self._insist(self._look_again)
                     self._waiting_since = None if self._waiting_since is None else time.monotonic()
         finally:
             ticker.stop()
+        self._fallen = False
+        self._check_reach()
         late = ticker.lateness.summary()
         self._log.info(
             f"episode of {self._body.tick} ticks: lateness p50 {late.p50_us:.0f}, p99 {late.p99_us:.0f} µs, "
@@ -209,8 +217,10 @@ class PlantNode:
             self._log.info("force is there: the body moves on")
         if self._settling:
             self._settling -= 1
-        elif self._body.tick < self._ticks:
+        elif self._body.tick < self._ticks and not self._fallen:
             self._body.advance(newest[0])
+            # The main thread ends the episode; the body stays where it is until then.
+            self._fallen = bool(self._body.beyond)
 
     def _publish(self) -> None:
         body, stamp = self._body, int(self._clock.now().nanoseconds)
@@ -228,29 +238,17 @@ class PlantNode:
         self._to_joint.publish(joint)
 
 
-def _read(node: Any) -> dict[str, Any]:
-    """Values of the parameters, checked and declared with their descriptors."""
-    from xb_muscle_ros.node.parameters import check_value, is_foreign, row_descriptor
-
-    rows = parameters()
-    given = {name: p.value for name, p in node.get_parameters_by_prefix("").items() if not is_foreign(name)}
-    values: dict[str, Any] = {}
-    for name in given:
-        if name not in rows:
-            raise UserError(f"parameter '{name}' is not known{suggest(name, rows)}")
-        node.undeclare_parameter(name)
-    for name, row in rows.items():
-        values[name] = check_value(name, row, given.get(name, row.default))
-        node.declare_parameter(name, values[name], row_descriptor(row), ignore_override=True)
-    return values
-
-
 def main() -> None:
     """Run the node until it is told to stop.
 
     Raises:
-        SystemExit: code 2 after one line on stderr, where the user can mend something.
+        SystemExit: code 0, or 2 after one line on stderr, where the user can mend something.
     """
+    # As for the muscle node, which see.
+    programs.run(_main, reader_left=0)
+
+
+def _main() -> int:
     asked: list[int] = []
 
     def stop(number: int, frame: FrameType | None) -> None:
@@ -261,11 +259,12 @@ def main() -> None:
     try:
         if "-h" in sys.argv or "--help" in sys.argv:
             print(USAGE)
-            return
+            return 0
         _run(lambda: bool(asked))
     except UserError as error:
         print(f"plant_node: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
+        return 2
+    return 0
 
 
 def _run(stop: Callable[[], bool]) -> None:

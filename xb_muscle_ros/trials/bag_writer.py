@@ -1,4 +1,4 @@
-"""The `rosbags` writer with two things made to fit: the name of the MCAP file, and text in ``custom_data``.
+"""The `rosbags` writer with three things made to fit: the MCAP file's name, ``custom_data`` and ``ros_distro``.
 
 rosbag2 numbers the files of a bag. And the YAML writer within `rosbags` wraps long lines in ways that add or lose
 spaces, in the metadata file and in its copy within the MCAP file; here nothing is wrapped.
@@ -16,6 +16,9 @@ from rosbags.rosbag2.enums import CompressionMode
 from rosbags.rosbag2.storage_mcap import McapWriter
 
 from xb_muscle_ros.trials import fast_yaml
+
+# Whose message definitions and type hashes the bags hold.
+ROS_DISTRO = "jazzy"
 
 
 class _Mcap(McapWriter):
@@ -61,7 +64,7 @@ class BagWriter(Writer):
 
 
 def _with_facts(text: str, facts: dict[str, str]) -> str:
-    """The metadata with ``custom_data`` put in, every value on one line."""
+    """The metadata with ``custom_data`` and ``ros_distro`` put in, every value on one line."""
     tree: dict[str, Any] = fast_yaml.load(text)
-    tree.get("rosbag2_bagfile_information", tree)["custom_data"] = facts
+    tree.get("rosbag2_bagfile_information", tree).update(custom_data=facts, ros_distro=ROS_DISTRO)
     return fast_yaml.dump(tree)

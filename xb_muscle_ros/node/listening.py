@@ -1,0 +1,112 @@
+"""The node's subscriptions: quality of service, what was published before, and what got lost."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.qos import QoSDurabilityPolicy, QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from sensor_msgs.msg import JointState
+
+from xb_muscle_ros.node.arrivals import Arrivals
+from xb_muscle_ros.node.latched import Latched
+
+
+class Inlet(Protocol):
+    """What takes the messages."""
+
+    open: bool
+
+    def take_length(self, message: Any) -> None:
+        """Callback of ``muscle/length``."""
+
+    def take_calcium(self, message: Any, latched: bool = False) -> None:
+        """Callback of ``muscle/calcium``; `latched`: from before the node listened, and may come twice."""
+
+    def forget(self) -> None:
+        """What comes from now on has nothing to do with what came before."""
+
+
+class Listening:
+    """Subscriptions of ``muscle/calcium`` and ``muscle/length``, until `close`.
+
+    Attributes:
+        arrivals: of each topic, by ``calcium`` and ``length``.
+    """
+
+    def __init__(self, node: Any, inlet: Inlet, mode: str) -> None:
+        """Subscribe; messages are taken while the inlet is open."""
+        self._node = node
+        self._inlet = inlet
+        self._mode = mode
+        self._latched: Latched | None = Latched(node, "muscle/calcium", lambda m: inlet.take_calcium(m, latched=True))
+        self.arrivals = {
+            "calcium": Arrivals(inlet.take_calcium, self.look),
+            "length": Arrivals(inlet.take_length),
+        }
+        # Calcium first: where both wait, it is then taken before the length that needs it.
+        calcium, length = (self._subscribe(topic) for topic in ("calcium", "length"))
+        self._subscriptions = (calcium, length)
+        if calcium.qos_profile.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL:
+            # The user wants it so: it hears what is kept by itself, and volatile publishers not at all.
+            self._latched = None
+
+    def open(self, is_open: bool) -> None:
+        """Begin to take messages, those that publishers have kept among them, or end."""
+        if is_open == self._inlet.open:
+            return
+        self._inlet.open = is_open
+        self._inlet.forget()
+        for arrivals in self.arrivals.values():
+            arrivals.counting = is_open
+        if self._latched is not None:
+            self._latched.forget()
+        self.look()
+
+    def look(self) -> None:
+        """Look for publishers of calcium that keep what they sent."""
+        if self._latched is not None and self._inlet.open:
+            self._latched.look()
+
+    def reset(self) -> None:
+        """Count anew. In lockstep calcium is forgotten, and what publishers sent before is of the time before."""
+        for arrivals in self.arrivals.values():
+            arrivals.lost = 0
+        if self._latched is not None and self._mode == "lockstep":
+            self._latched.skip()
+        self._inlet.forget()
+
+    def close(self) -> None:
+        """Leave the topics."""
+        if self._latched is not None:
+            self._latched.forget()
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+
+    def _subscribe(self, topic: str) -> Any:
+        arrivals = self.arrivals[topic]
+        return self._node.create_subscription(
+            JointState,
+            f"muscle/{topic}",
+            arrivals,
+            _qos(self._mode),
+            event_callbacks=SubscriptionEventCallbacks(matched=arrivals.matched),
+            **overridable(),
+        )
+
+
+def _qos(mode: str) -> QoSProfile:
+    """A profile of its own for each subscription: rclpy writes a parameter file's overrides into it."""
+    if mode == "lockstep":
+        return QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
+    # A lost sample breaks lockstep; in realtime an old one is worth less than none.
+    return QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
+
+
+def overridable() -> dict[str, Any]:
+    """What a parameter file may change of a publisher or subscription, as arguments for its making."""
+    kinds = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
+    return {"qos_overriding_options": QoSOverridingOptions(kinds)}
