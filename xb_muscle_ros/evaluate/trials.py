@@ -13,8 +13,10 @@ from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable
 from xb_muscle_ros.scores.conditions import AMPLITUDES_L0, RECOVERIES_S
 from xb_muscle_ros.trials.trial import Array
 
+MEASURED = "measured"
 WINDOWS = ("whole", "conditioning", "test")
-_ANSWERS = ("srs_conditioning", "srs_test", "isometric_f0", "k_tr", "k_tr_se")
+_READ_OFF = ("srs_conditioning", "srs_test", "isometric_f0")
+_ANSWERS = (*(f"{name}{end}" for name in _READ_OFF for end in ("", "_se")), "k_tr", "k_tr_se")
 MODEL_FIELDS = (*(f"rmsd_{window}" for window in WINDOWS), *_ANSWERS)
 # A table over more levels than this on an axis is one over the common conditions only.
 _MOST_LEVELS = 40
@@ -43,6 +45,7 @@ class Trials:
         self.problems: dict[str, str] = {}
         self.missing: dict[str, set[str]] = {}
         self._warnings: dict[int, list[str]] = {}
+        self._why: dict[int, dict[str, dict[str, str]]] = {}
         self._codes: dict[str, int] = {}
         self._code = np.full(bags, -1)
         self._shapes: dict[int, dict[str, Any]] = {}
@@ -73,6 +76,9 @@ class Trials:
             self.missing.setdefault(name, set()).add(facts["fibre"])
         if found["warnings"]:
             self._warnings[index] = list(found["warnings"])
+        told = {name: each["why"] for name, each in {MEASURED: found["measured"], **found["models"]}.items()}
+        if any(told.values()):
+            self._why[index] = {name: dict(why) for name, why in told.items()}
 
     @property
     def good(self) -> npt.NDArray[np.bool_]:
@@ -89,6 +95,10 @@ class Trials:
     def warnings(self) -> list[str]:
         """All warnings, in order of the bags."""
         return [line for index in sorted(self._warnings) for line in self._warnings[index]]
+
+    def why(self, index: int, of: str) -> dict[str, str]:
+        """What a trial lacks that could be expected, measured or by a model, and why."""
+        return self._why.get(index, {}).get(of, {})
 
     def refuse(self, index: int, problem: str) -> None:
         """Take a bag out."""
@@ -153,8 +163,11 @@ def srs_table(trials: Trials, model: str | None, label: str) -> SrsTable | None:
     for name in trials.fibres:
         mine = used & trials.is_of(name)
         cell = tuple(p[mine] for p in places)
-        held = [_mean_in_cells(values[q][mine], cell, shape) for q in ("srs_test", "srs_conditioning", "isometric_f0")]
-        fibres[name] = FibreSrs(test=held[0], conditioning=held[1], isometric=held[2])
+        (test, test_se), (conditioning, conditioning_se), (isometric, _) = (
+            _mean_in_cells(values[q][mine], values[f"{q}_se"][mine], cell, shape)
+            for q in ("srs_test", "srs_conditioning", "isometric_f0")
+        )
+        fibres[name] = FibreSrs(test, conditioning, isometric, test_se, conditioning_se)
     return SrsTable(label, pca, recovery, amplitude, fibres)
 
 
@@ -174,22 +187,30 @@ def _places(axis: Array, values: Array) -> npt.NDArray[np.int64]:
     return np.where(near, nearest, -1)
 
 
-def _mean_in_cells(values: Array, cell: tuple[npt.NDArray[np.int64], ...], shape: tuple[int, ...]) -> Array:
-    total, count = np.zeros(shape), np.zeros(shape)
+def _mean_in_cells(
+    values: Array, errors: Array, cell: tuple[npt.NDArray[np.int64], ...], shape: tuple[int, ...]
+) -> tuple[Array, Array]:
+    """Means and their standard errors; repeats weigh by 1/SE² in cells where all errors are known, else alike."""
     some = np.isfinite(values)
     at = tuple(index[some] for index in cell)
-    np.add.at(total, at, values[some])
-    np.add.at(count, at, 1.0)
-    mean: Array = np.where(count > 0.0, total, np.nan) / np.maximum(count, 1.0)
-    return mean
+    known = np.isfinite(errors[some]) & (errors[some] > 0.0)
+    unknown = np.zeros(shape)
+    np.add.at(unknown, at, ~known)
+    weights = np.where(unknown[at] > 0.0, 1.0, 1.0 / np.where(known, errors[some], 1.0) ** 2)
+    total, weight = np.zeros(shape), np.zeros(shape)
+    np.add.at(total, at, weights * values[some])
+    np.add.at(weight, at, weights)
+    mean: Array = np.where(weight > 0.0, total, np.nan) / np.where(weight > 0.0, weight, 1.0)
+    error: Array = np.where((weight > 0.0) & (unknown == 0.0), 1.0, np.nan) / np.sqrt(np.where(weight > 0.0, weight, 1.0))
+    return mean, error
 
 
 def _put(columns: dict[str, Array], index: int, values: Mapping[str, Any]) -> None:
-    for name in ("srs_conditioning", "srs_test", "isometric_f0"):
-        columns[name][index] = _number(values[name])
+    for name in _READ_OFF:
+        columns[name][index], columns[f"{name}_se"][index] = _number(values[name]), _number(values[f"{name}_se"])
     if values["k_tr"] is not None:
         columns["k_tr"][index] = values["k_tr"]["k_per_s"]
-        columns["k_tr_se"][index] = values["k_tr"]["se_per_s"]
+        columns["k_tr_se"][index] = _number(values["k_tr"]["se_per_s"])
 
 
 def _number(value: float | None) -> float:

@@ -10,8 +10,8 @@ import numpy.typing as npt
 import pytest
 from scipy.signal import lfilter
 
-from xb_muscle_ros.diagnose.noise.windows import Window
 from xb_muscle_ros.replay.made import coloured_noise
+from xb_muscle_ros.scores.noise.windows import Window
 from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
 
 Array = npt.NDArray[np.float64]
