@@ -96,7 +96,8 @@ def test_absent_phases_and_measurements_are_null(muscle: Muscle) -> None:
 
 
 def test_relative_srs_needs_a_reference_of_the_same_pca() -> None:
-    base = {"fibre": "f", "srs_test": 8.0, "measured_srs_test": 6.0, "recovery_s": 0.1}
+    measured = {"measured_srs_test": 6.0, "measured_srs_test_se": 0.3, "notes": []}
+    base = {"fibre": "f", "srs_test": 8.0, "recovery_s": 0.1, **measured}
     records = [
         {**base, "pca": 6.1, "amplitude_l0": 0.0383},
         {**base, "pca": 6.1, "amplitude_l0": 0.0, "srs_test": 10.0, "measured_srs_test": None},

@@ -20,7 +20,7 @@ from xb_muscle_ros.evaluate.sets import ModelSet, gather
 from xb_muscle_ros.evaluate.srs_scores import ALL_READINGS, READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, read_table, read_tables
 from xb_muscle_ros.evaluate.tables_text import write_csv
-from xb_muscle_ros.evaluate.trials import Trials, duplicates, srs_table
+from xb_muscle_ros.evaluate.trials import MEASURED, Trials, duplicates, srs_table
 from xb_muscle_ros.files import write_text
 from xb_muscle_ros.models.fibre_file import fibre_folders, find_fibre_file, load_fibre
 from xb_muscle_ros.scores.enhancement import AFTER_S
@@ -128,7 +128,7 @@ def write_tables(out: Path, results: Results) -> list[Path]:
         table("force_rmsd.csv", sections.force_rows(found["force_rmsd"]), sections.FORCE_COLUMNS)
     if results.data is not None:
         table("relative_srs.csv", sections.relative_rows(results.tables, results.data), sections.RELATIVE_COLUMNS)
-        cells = {more_scores.MEASURED: results.data, **results.tables}
+        cells = {MEASURED: results.data, **results.tables}
         table("srs_cells.csv", sections.cell_rows(cells), sections.CELL_COLUMNS)
     if "paper" in found:
         table("srs_rmsd.csv", found["paper"]["readings"], list(found["paper"]["readings"][0]))
@@ -184,7 +184,9 @@ def _recordings(request: Request, results: Results, tell: Callable[[str], None])
     found_sections["force_pca"] += more_scores.force_pca_of_trials(trials)
     found_sections["k_tr"] += more_scores.k_tr_rows(trials)
     _enhancement(request, results, made[0])
-    data = srs_table(trials, None, more_scores.MEASURED)
+    found_sections["notes"] = sections.notes(trials, found_sections)
+    results.warnings += found_sections["notes"]
+    data = srs_table(trials, None, MEASURED)
     if data is not None:
         results.data = data
         for each in results.models:
@@ -192,6 +194,7 @@ def _recordings(request: Request, results: Results, tell: Callable[[str], None])
             if table is not None:
                 results.tables[each.name] = table
         found_sections["srs"] = sections.srs_section(results.tables, data, results.models)
+        results.warnings += sections.left_out_lines(found_sections["srs"])
 
 
 def _fibre_files(given: Sequence[str]) -> dict[str, Path] | None:
@@ -272,7 +275,7 @@ def _paper(request: Request, results: Results, data: SrsTable, golden: Mapping[s
             "recordings": bool(request.bags),
         },
     }
-    for label, table in [(more_scores.MEASURED, data), *tables.items()]:
+    for label, table in [(MEASURED, data), *tables.items()]:
         results.sections["force_pca"] += more_scores.force_pca_of_table(table, label)
 
 

@@ -59,6 +59,7 @@ class SrsTable:
         label: what the values are, for tables and figures.
         pca, recovery_s, amplitude_l0: the axes, 1-D; s and L0.
         fibres: by name.
+        repeats_left_out: trials that were left out of their condition's mean for their standard error.
     """
 
     label: str
@@ -66,6 +67,7 @@ class SrsTable:
     recovery_s: Array
     amplitude_l0: Array
     fibres: Mapping[str, FibreSrs]
+    repeats_left_out: int = 0
 
     def isometric_f0(self, fibre: str) -> Array:
         """Isometric force at each pCa, shape (pca,), F0: mean over the trials that have it."""
@@ -165,7 +167,9 @@ class SrsTable:
 def _pooled(table: SrsTable, kind: str, by: SrsTable | None) -> dict[str, ByClass]:
     return {
         name: by_class(
-            np.where(table.sound(name, kind), fibre.test, np.nan), table.unconditioned(name, kind), table.classes(name, by)
+            np.where(table.sound(name, kind), fibre.test, np.nan),
+            table.unconditioned(name, kind),
+            table.classes(name, by),
         )
         for name, fibre in table.fibres.items()
     }

@@ -159,16 +159,17 @@ def srs_table(trials: Trials, model: str | None, label: str) -> SrsTable | None:
     ]
     used &= np.all([p >= 0 for p in places], axis=0)
     shape = (pca.size, recovery.size, amplitude.size)
-    fibres = {}
+    fibres, repeats_left_out = {}, 0
     for name in trials.fibres:
         mine = used & trials.is_of(name)
         cell = tuple(p[mine] for p in places)
-        (test, test_se), (conditioning, conditioning_se), (isometric, _) = (
+        (test, test_se, out), (conditioning, conditioning_se, _), (isometric, _, _) = (
             _mean_in_cells(values[q][mine], values[f"{q}_se"][mine], cell, shape)
             for q in ("srs_test", "srs_conditioning", "isometric_f0")
         )
         fibres[name] = FibreSrs(test, conditioning, isometric, test_se, conditioning_se)
-    return SrsTable(label, pca, recovery, amplitude, fibres)
+        repeats_left_out += out
+    return SrsTable(label, pca, recovery, amplitude, fibres, repeats_left_out)
 
 
 def _levels(values: Array, common: tuple[float, ...] | None) -> Array:
@@ -189,20 +190,25 @@ def _places(axis: Array, values: Array) -> npt.NDArray[np.int64]:
 
 def _mean_in_cells(
     values: Array, errors: Array, cell: tuple[npt.NDArray[np.int64], ...], shape: tuple[int, ...]
-) -> tuple[Array, Array]:
-    """Means and their standard errors; repeats weigh by 1/SE² in cells where all errors are known, else alike."""
+) -> tuple[Array, Array, int]:
+    """Means, their standard errors, and how many repeats are left out.
+
+    Left out of a mean is a repeat with a standard error as large as the largest of them, where another has less:
+    repeats differ by more than their noise, so that weights by 1/SE² would leave little but one of them.
+    """
     some = np.isfinite(values)
-    at = tuple(index[some] for index in cell)
-    known = np.isfinite(errors[some]) & (errors[some] > 0.0)
-    unknown = np.zeros(shape)
-    np.add.at(unknown, at, ~known)
-    weights = np.where(unknown[at] > 0.0, 1.0, 1.0 / np.where(known, errors[some], 1.0) ** 2)
-    total, weight = np.zeros(shape), np.zeros(shape)
-    np.add.at(total, at, weights * values[some])
-    np.add.at(weight, at, weights)
-    mean: Array = np.where(weight > 0.0, total, np.nan) / np.where(weight > 0.0, weight, 1.0)
-    error: Array = np.where((weight > 0.0) & (unknown == 0.0), 1.0, np.nan) / np.sqrt(np.where(weight > 0.0, weight, 1.0))
-    return mean, error
+    values, errors, at = values[some], errors[some], tuple(index[some] for index in cell)
+    largest, least = np.zeros(shape), np.full(shape, np.inf)
+    np.maximum.at(largest, at, np.abs(values))
+    np.fmin.at(least, at, errors)
+    kept = ~((errors >= largest[at]) & (least[at] < largest[at]))
+    values, errors, at = values[kept], errors[kept], tuple(index[kept] for index in at)
+    total, count, squares = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    np.add.at(total, at, values)
+    np.add.at(count, at, 1.0)
+    np.add.at(squares, at, errors**2)
+    divisor = np.where(count > 0.0, count, np.nan)
+    return total / divisor, np.sqrt(squares) / divisor, int(np.count_nonzero(~kept))
 
 
 def _put(columns: dict[str, Array], index: int, values: Mapping[str, Any]) -> None:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from xb_muscle_ros.scores.estimate import Estimate, Missing, quotient
+from xb_muscle_ros.scores.estimate import Estimate, Missing, quotient, rounded
 from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.trial import Array
 
@@ -64,7 +64,7 @@ def enhancement(stretched: Side, isometric: Side, at_s: float) -> Enhancement | 
     over = quotient(Estimate(*a), Estimate(*b))
     difference = a.value - b.value
     relative = None if over.value is None else difference / b.value
-    se = None if a.se is None or b.se is None else math.hypot(a.se, b.se)
+    se = None if a.se is None or b.se is None else rounded(math.hypot(a.se, b.se))
     # The relative enhancement is the quotient of the forces less one, with the same error.
     return Enhancement(a.value, b.value, difference, relative, se, over.se)
 

@@ -33,6 +33,11 @@ def unsound(value: float | None, se: float | None) -> bool:
     return value is not None and se is not None and math.isfinite(se) and se >= abs(value)
 
 
+def rounded(se: float) -> float:
+    """A standard error to three digits: more are never known, and they would depend on the machine."""
+    return float(f"{se:.3g}")
+
+
 def quotient(value: Estimate, reference: Estimate) -> Estimate:
     """Quotient of two numbers whose errors are independent; its standard error to first order.
 
@@ -48,7 +53,7 @@ def quotient(value: Estimate, reference: Estimate) -> Estimate:
     ratio = value.value / reference.value
     if value.se is None or reference.se is None:
         return Estimate(ratio, why=value.why or reference.why)
-    return Estimate(ratio, math.hypot(value.se, ratio * reference.se) / abs(reference.value))
+    return Estimate(ratio, rounded(math.hypot(value.se, ratio * reference.se) / abs(reference.value)))
 
 
 def error_text(se: float | None, factor: float = 1.0) -> str:

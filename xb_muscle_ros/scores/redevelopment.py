@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import curve_fit
 
-from xb_muscle_ros.scores.estimate import Missing
+from xb_muscle_ros.scores.estimate import Missing, rounded
 from xb_muscle_ros.scores.noise.autocovariance import autocovariance, covariance_of_sums
+from xb_muscle_ros.scores.noise.hum import hum
 from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.trial import Array
 
@@ -123,13 +124,18 @@ def redevelopment(
     residual = force - _rise(since, *found)
     # How the rate answers to the force at each sample.
     weights = np.linalg.pinv(_slopes(since, *found))[0][:, None]
-    variance = float(covariance_of_sums(weights, autocovariance(residual, t.size))[0, 0])
+    step_s = float(np.mean(np.diff(t)))
+    lines, rest = hum(step_s, residual)
+    gamma = autocovariance(rest, t.size)
+    for line in lines:
+        gamma = gamma + line.autocovariance(step_s * np.arange(t.size))
+    variance = float(covariance_of_sums(weights, gamma)[0, 0])
     se = math.sqrt(max(variance, 0.0) * t.size / (t.size - 3))
     if noise is not None:
         se = max(se, noise.of_sum(weights[:, 0], t))
     return Redevelopment(
         k_per_s=float(found[0]),
-        se_per_s=se,
+        se_per_s=rounded(se),
         start_f0=float(found[1]),
         end_f0=float(found[2]),
         rmsd_f0=float(np.sqrt(np.mean(residual**2))),

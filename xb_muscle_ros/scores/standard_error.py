@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.scores.estimate import rounded
 from xb_muscle_ros.scores.noise.autocovariance import covariance_of_sums
 from xb_muscle_ros.scores.noise.hum import Line, hum
 from xb_muscle_ros.scores.noise.model import TrialNoise
@@ -61,7 +62,7 @@ class ForceNoise:
 
     def of_sum(self, weights: Array, time_s: Array) -> float:
         """Standard error of one weighted sum of samples, weights of shape (n,)."""
-        return float(np.sqrt(max(float(self.covariance(weights[:, None], time_s)[0, 0]), 0.0)))
+        return rounded(float(np.sqrt(max(float(self.covariance(weights[:, None], time_s)[0, 0]), 0.0))))
 
     def of_mean(self, time_s: Array) -> float:
         """Standard error of the mean of samples at these times, F0."""

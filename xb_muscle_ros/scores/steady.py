@@ -18,7 +18,7 @@ from xb_muscle_ros.trials.trial import Array, Phase, Trial
 
 # Calcium that stays within this share of its largest value does not change.
 _SAME_CALCIUM = 0.05
-# A muscle is active, or rests, from where calcium passes this share of its peak; until it leaves this share of the peak.
+# A muscle is active, or rests, from where calcium passes the first share of its peak; it is active down to the other.
 _HALF, _STILL_ACTIVE = 0.5, 0.9
 # Force has settled while its mean over a tenth of the time since activation, at least one period of hum, stays within
 # this share of its largest value around the level of the last third.

@@ -35,7 +35,7 @@ class Window(NamedTuple):
 
 
 def isometric_window(trial: Trial) -> Window:
-    """The measured force of a trial while it is steady before its first length change, or else late in its longest pause.
+    """The steady force of a trial before its first length change, or where it has none, late in its longest pause.
 
     A pause is a recovery or hold, late its last third, by when what the length change did has mostly passed.
     """
