@@ -15,9 +15,10 @@ from xb_muscle_ros.replay.report import record
 from xb_muscle_ros.scores.isometric import isometric_force
 from xb_muscle_ros.scores.noise.windows import isometric_window
 from xb_muscle_ros.scores.steady import steady_part
-from xb_muscle_ros.trials.readers.csv import read_csv
-from xb_muscle_ros.trials.readers.mapping import build_mapping, load_mapping
-from xb_muscle_ros.trials.simulated import Simulated
+from xb_muscle_ros.trials.importing import Imported, import_recordings
+from xb_muscle_ros.trials.readers.mapping import load_mapping
+from xb_muscle_ros.trials.readers.settings import ImportSettings
+from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
 from xb_muscle_ros.trials.trial import Array, Phase, Trial, TrialFacts
 
 TIME = np.arange(3001) * 1e-3
@@ -53,7 +54,7 @@ def test_all_commands_take_the_same_force() -> None:
     trial = muscle(rising(0.1) + noise)
     expected = isometric_force(trial, TIME, trial.measured_f0).value
     assert expected is not None
-    simulated = Simulated(TIME, trial.force_n, TIME, TIME, {})
+    simulated = Simulated(TIME, trial.force_n, TIME, TIME, dict.fromkeys(MOMENTS, TIME))
     assert record(trial, simulated, load_fibre("18Dec2017a"))["measured_isometric_force_f0"] == expected
     assert answer(trial, TIME, trial.measured_f0)["isometric_f0"] == expected
     (fitted,) = fit_trials([trial], [False], whole=True)
@@ -114,10 +115,12 @@ def test_none_is_told_with_its_reason() -> None:
 
 
 @pytest.mark.parametrize("trial", ["fig6and7A_trial45", "fig6and7A_trial50", "fig7C_trial65", "fig6and7A_trial43"])
-def test_recorded_whole_muscles(trial: str, shared_data: Path, repo_root: Path) -> None:
+def test_recorded_whole_muscles(trial: str, shared_data: Path, repo_root: Path, tmp_path: Path) -> None:
     """Cat soleus: F0 is the force of trial 43, and the others of this muscle come within 6 % of it at 0 to 6 mm."""
     name = "cat_soleus_herzog_leonard_2002"
-    mapping = build_mapping(load_mapping(repo_root / "scripts" / "datasets" / f"{name}.yaml"), trial)
-    found = read_csv(shared_data / "recordings" / name / f"{trial}.csv", mapping)
+    where = repo_root / "scripts" / "datasets" / f"{name}.yaml"
+    source = shared_data / "recordings" / name / f"{trial}.csv"
+    events = import_recordings([source], ImportSettings(load_mapping(where), where.name), tmp_path)
+    (found,) = (event.trial for event in events if isinstance(event, Imported))
     force = isometric_force(found, found.force_time_s, found.measured_f0).value
     assert force == pytest.approx(1.0, abs=0.06)

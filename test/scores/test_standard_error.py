@@ -110,7 +110,7 @@ def test_isometric_force(setting: Setting) -> None:
 def test_srs_sampled_every_6_ms_has_no_value() -> None:
     found = read_off_measured(trial(np.random.default_rng(0), Setting(step_s=6e-3)))["srs_test"]
     assert found.value is None
-    assert found.why.endswith("samples in the first 10 ms of the stretch; 3 are needed")
+    assert found.why.endswith(" in the first 10 ms of the stretch; 3 are needed")
 
 
 def test_k_tr_in_noise_and_hum() -> None:

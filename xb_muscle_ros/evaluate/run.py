@@ -21,6 +21,7 @@ from xb_muscle_ros.evaluate.srs_scores import ALL_READINGS, READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, read_table, read_tables
 from xb_muscle_ros.evaluate.tables_text import write_csv
 from xb_muscle_ros.evaluate.trials import MEASURED, Trials, duplicates, srs_table
+from xb_muscle_ros.figures.evaluate_srs import NOTHING_TO_DRAW, drawable
 from xb_muscle_ros.files import write_text
 from xb_muscle_ros.models.fibre_file import fibre_folders, find_fibre_file, load_fibre
 from xb_muscle_ros.scores.enhancement import AFTER_S
@@ -103,6 +104,8 @@ def evaluate(request: Request, tell: Callable[[str], None] = lambda line: None) 
         _recordings(request, results, tell)
     if data is not None:
         _paper(request, results, data, golden)
+    if results.data and results.tables and not drawable(results.data, results.tables, results.sections["srs"]):
+        results.warnings.append(NOTHING_TO_DRAW)
     return results
 
 
@@ -147,11 +150,9 @@ def draw_figures(out: Path, results: Results) -> list[Path]:
         made.append(out / "force_rmsd.png")
         draw_force(made[-1], force)
     if results.data is not None and results.tables:
-        titles = {each.name: each.title for each in results.models}
-        made.append(out / "relative_srs.png")
-        draw_srs(made[-1], results.data, results.tables, titles, results.sections["srs"])
-        surfaces = out / "srs_surfaces.png"
-        made += [surfaces] if draw_surfaces(surfaces, results.data, results.tables, titles) else []
+        profiles, surfaces = out / "relative_srs.png", out / "srs_surfaces.png"
+        made += [profiles] if draw_srs(profiles, results.data, results.tables, results.sections["srs"]) else []
+        made += [surfaces] if draw_surfaces(surfaces, results.data, results.tables) else []
     return made
 
 

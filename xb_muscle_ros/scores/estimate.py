@@ -33,6 +33,11 @@ def unsound(value: float | None, se: float | None) -> bool:
     return value is not None and se is not None and math.isfinite(se) and se >= abs(value)
 
 
+def samples(count: int) -> str:
+    """So many samples, in words."""
+    return f"{count} sample{'' if count == 1 else 's'}"
+
+
 def rounded(se: float) -> float:
     """A standard error to three digits: more are never known, and they would depend on the machine."""
     return float(f"{se:.3g}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from xb_muscle_ros.scores.estimate import samples
 from xb_muscle_ros.trials.protocol import TEST_DURATION_S
 from xb_muscle_ros.trials.trial import Array, Trial
 
@@ -59,7 +60,7 @@ def short_windows(trial: Trial) -> dict[str, str]:
         for name, window in windows(trial).items()
         if window is not None
     }
-    return {name: f"{count} samples in the window; 3 are needed" for name, count in counts.items() if count < FEWEST}
+    return {name: f"{samples(count)} in the window; 3 are needed" for name, count in counts.items() if count < FEWEST}
 
 
 def _inside(time_s: Array, window: tuple[float, float]) -> npt.NDArray[np.bool_]:

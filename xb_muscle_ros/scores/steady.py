@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from xb_muscle_ros.scores.estimate import samples
 from xb_muscle_ros.trials.phases import initial_isometric
 from xb_muscle_ros.trials.trial import Array, Phase, Trial
 
@@ -58,7 +59,7 @@ def steady_part(trial: Trial, time_s: Array, force_f0: Array) -> Steady:
     if active is None:
         inside = initial_isometric(time_s, phases)
         count = inside.stop - inside.start
-        return Steady(inside) if count >= _FEWEST else _none(f"{_samples(count)} before length changes; 3 are needed")
+        return Steady(inside) if count >= _FEWEST else _none(f"{samples(count)} before length changes; 3 are needed")
     begin, end = (int(i) for i in np.searchsorted(time_s, active))
     settled = _settled_from(time_s[begin:end], force_f0[begin:end])
     if settled is None:
@@ -68,15 +69,11 @@ def steady_part(trial: Trial, time_s: Array, force_f0: Array) -> Steady:
     if len(phases) > 1:
         end = begin + round((1.0 - _LEAKED) * (end - begin))
     count = end - begin
-    return Steady(slice(begin, end)) if count >= _FEWEST else _none(f"{_samples(count)} of steady force; 3 are needed")
+    return Steady(slice(begin, end)) if count >= _FEWEST else _none(f"{samples(count)} of steady force; 3 are needed")
 
 
 def _none(why: str) -> Steady:
     return Steady(slice(0, 0), why)
-
-
-def _samples(count: int) -> str:
-    return f"{count} sample{'' if count == 1 else 's'}"
 
 
 def _active(trial: Trial, phases: tuple[Phase, ...]) -> tuple[float, float] | None:

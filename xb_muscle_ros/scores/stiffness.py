@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from xb_muscle_ros.scores.estimate import Estimate
+from xb_muscle_ros.scores.estimate import Estimate, samples
 from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.trial import Array, Phase
 
@@ -29,7 +29,7 @@ def short_range_stiffness(
     inside = (time_s > onset_s + 5e-10) & (time_s <= onset_s + WINDOW_S + 5e-10)
     count = int(np.count_nonzero(inside))
     if count < _FEWEST:
-        return Estimate(None, why=f"{count} samples in the first {1e3 * WINDOW_S:g} ms of the stretch; 3 are needed")
+        return Estimate(None, why=f"{samples(count)} in the first {1e3 * WINDOW_S:g} ms of the stretch; 3 are needed")
     length = length_l0[inside]
     if np.ptp(length) == 0.0:
         return Estimate(None, why=f"length does not change in the first {1e3 * WINDOW_S:g} ms of the stretch")
