@@ -48,7 +48,7 @@ def draw_surfaces(path: Path, data: SrsTable, tables: Mapping[str, SrsTable]) ->
         for axis, name in zip(axes, shown, strict=True):
             drawn = _panel(axis, data, tables[name])
             axis.set_title(label(name), fontsize=8, y=1.02)
-            axis.set_box_aspect((1.0, 1.0, 0.75), zoom=1.12)
+            axis.set_box_aspect((1.0, 1.0, 0.75), zoom=1.0)
         bar = made.colorbar(drawn, ax=axes, shrink=0.6, aspect=25, pad=0.06)
         bar.set_label("Relative SRS, low and intermediate activation")
         save(made, path)

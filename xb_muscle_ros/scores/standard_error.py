@@ -21,7 +21,7 @@ from xb_muscle_ros.scores.noise.hum import Line, hum
 from xb_muscle_ros.scores.noise.model import TrialNoise
 from xb_muscle_ros.scores.noise.pieces import evenly_sampled
 from xb_muscle_ros.scores.noise.trials import ENOUGH, by_windows, noise_of
-from xb_muscle_ros.scores.noise.windows import isometric_window
+from xb_muscle_ros.scores.noise.windows import LEAST, isometric_window
 from xb_muscle_ros.trials.trial import Trial
 
 Array = npt.NDArray[np.float64]
@@ -76,8 +76,10 @@ def force_noise(trial: Trial) -> ForceNoise | None:
     name, step_s = trial.facts.trial, float(np.median(np.diff(trial.force_time_s)))
     if evenly_sampled(trial):
         window = isometric_window(trial)
-        if window.force_f0.size >= ENOUGH:
-            lines, rest = hum(window.step_s, window.force_f0)
+        if window.force_f0.size >= LEAST:
+            # In fewer samples a line is no sharper than an autoregression.
+            enough = window.force_f0.size >= ENOUGH
+            lines, rest = hum(window.step_s, window.force_f0) if enough else ((), window.force_f0)
             return ForceNoise(by_windows([window._replace(force_f0=rest)])[name], step_s, lines)
     try:
         return ForceNoise(noise_of([trial]).trials[0], step_s)
