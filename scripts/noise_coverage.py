@@ -17,10 +17,10 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.cells import Residual
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise.model import NoiseModel
-from xb_muscle_ros.diagnose.noise.pieces import evenly_sampled, smooth_pieces
-from xb_muscle_ros.diagnose.noise.trials import by_curves
 from xb_muscle_ros.diagnose.significance import significance
+from xb_muscle_ros.scores.noise.model import NoiseModel
+from xb_muscle_ros.scores.noise.pieces import evenly_sampled, smooth_pieces
+from xb_muscle_ros.scores.noise.trials import by_curves
 from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
 
 Array = npt.NDArray[np.float64]

@@ -12,10 +12,10 @@ import pytest
 
 from xb_muscle_ros.diagnose.cells import Residual
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise.model import NoiseModel
-from xb_muscle_ros.diagnose.noise.trials import by_windows
-from xb_muscle_ros.diagnose.noise.windows import Window
 from xb_muscle_ros.replay.made import coloured_noise
+from xb_muscle_ros.scores.noise.model import NoiseModel
+from xb_muscle_ros.scores.noise.trials import by_windows
+from xb_muscle_ros.scores.noise.windows import Window
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 
 Array = npt.NDArray[np.float64]

@@ -15,7 +15,8 @@ def made(rows: list[tuple[str, float, float, float, dict[str, float]]]) -> Trial
     """Trials of (fibre, pCa, amplitude, recovery, model -> RMSD over the whole window)."""
     trials = Trials(len(rows))
     for i, (fibre, pca, amplitude, recovery, models) in enumerate(rows):
-        answers = {"srs_conditioning": None, "srs_test": None, "isometric_f0": None, "k_tr": None}
+        read_off = ("srs_conditioning", "srs_test", "isometric_f0")
+        answers = {**dict.fromkeys(f"{name}{end}" for name in read_off for end in ("", "_se")), "k_tr": None, "why": {}}
         rmsd = {
             name: {**answers, "rmsd_f0": {"whole": v, "conditioning": None, "test": v / 2}}
             for name, v in models.items()

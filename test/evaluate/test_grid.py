@@ -43,7 +43,7 @@ def test_cells_are_those_of_whole_trials(model: str) -> None:
             samples = test.start_s + np.arange(1, 11) * 1e-3
             states = muscle.follow(settled, corner_s, length, np.full(corner_s.size, calcium), samples)
             force = muscle.outputs_of(states)["force_f0"]
-            whole = short_range_stiffness(samples, np.interp(samples, corner_s, length), force, test.start_s)
+            whole = short_range_stiffness(samples, np.interp(samples, corner_s, length), force, test.start_s).value
             assert found["srs_test"][i][j] == pytest.approx(whole, rel=2e-4)
     assert found["srs_conditioning"] == pytest.approx(found["srs_test"][0][0], rel=1e-3)
     assert found["isometric_f0"] == pytest.approx(muscle.outputs(settled).force_f0, abs=1e-12)

@@ -80,12 +80,14 @@ def test_recordings_to_files(bags: Path, tmp_path: Path) -> None:
 
 
 def test_conditions_that_are_not_the_papers(make: Maker, tmp_path: Path) -> None:
-    """Neither the common amplitude nor a common recovery time: scores are empty, figures say so."""
+    """Neither the common amplitude nor a common recovery time: no empty figure, and a line that says why."""
     paths = [make(pca=pca, amplitude_l0=a, recovery_s=0.07) for pca in (4.5, 6.1) for a in (0.01, 0.03)]
     made = request(tmp_path / "out", *paths)
     results = evaluate(made)
     assert results.sections["srs"]["models"]["2state"]["text"]["conditions"]["all"] == 0
-    assert {path.name for path in write(made, results)} >= {"relative_srs.png", "force_rmsd.png"}
+    assert "force_rmsd.png" in {path.name for path in write(made, results)}
+    assert not list((tmp_path / "out").glob("relative_srs.p*"))
+    assert [line for line in results.warnings if line.startswith("relative_srs.png is not drawn: no trial with 3.83")]
     assert "conditions | AIC" not in (tmp_path / "out" / "evaluate.md").read_text()
 
 

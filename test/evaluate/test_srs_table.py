@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.evaluate.srs_table import SrsTable, read_table, read_tables, table_of
+from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable, read_table, read_tables, table_of
 from xb_muscle_ros.scores.activation import CLASSES
 
 LOW = CLASSES.index("low")
@@ -144,3 +144,21 @@ def test_several_tables_in_one_file(tmp_path: Path) -> None:
     path.write_text(json.dumps({"note": "x"}))
     with pytest.raises(UserError, match="holds no table"):
         read_tables(path, "m")
+
+
+def test_relative_srs_within_their_errors_are_left_out_and_counted() -> None:
+    """A stretch whose own SRS is small stays: means of those that happen to be large would come out too high."""
+    test = np.array([[[20.0, 0.1]], [[0.3, 0.5]], [[20.0, 18.0]]])
+    error = np.array([[[1.0, 1.0]], [[0.4, 0.4]], [[1.0, 30.0]]])
+    isometric = np.full(test.shape, 0.5)
+    fibre = FibreSrs(test, np.full(test.shape, np.nan), isometric, error, np.full(test.shape, np.nan))
+    axes = np.array([6.1, 6.2, 6.3]), np.array([0.001]), np.array([0.0, 0.0383])
+    table = SrsTable("measured", *axes, {"f": fibre})
+    # pCa 6.2: the reference is within its error; pCa 6.3: the test stretch has an error of more than the reference.
+    assert table.sound("f", "reference")[:, 0, 1].tolist() == [True, False, False]
+    assert table.left_out("reference") == (3, 6)
+    level = CLASSES.index("intermediate")
+    assert table.pooled("reference")["f"].test[level, 0, 1] == pytest.approx(0.1)
+    # The same without errors, as simulated SRS and tables have none, uses all.
+    bare = SrsTable("simulated", *axes, {"f": FibreSrs(test, fibre.conditioning, isometric)})
+    assert bare.left_out("reference") == (0, 6)

@@ -17,7 +17,7 @@ from xb_muscle_ros.fit.calibration import calibrated_force
 from xb_muscle_ros.fit.coordinates import Choice, fault_coordinates, parameter_coordinates, population_choices
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.features import F0_ANCHOR, Feature, measured, simulated
-from xb_muscle_ros.fit.noise import FIRST, autocovariance, noise_autocovariances, scale_of
+from xb_muscle_ros.fit.noise import FIRST, noise_autocovariances, scale_of
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.solve import Objective, descend
 from xb_muscle_ros.fit.split import held_out
@@ -26,6 +26,7 @@ from xb_muscle_ros.measurement.faults import FAULTS
 from xb_muscle_ros.models.fibre_file import Fibre, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.made import coloured_noise
+from xb_muscle_ros.scores.noise.autocovariance import autocovariance
 from xb_muscle_ros.trials.trial import Trial, TrialFacts
 
 Maker = Callable[..., list[Trial]]

@@ -96,7 +96,8 @@ def test_absent_phases_and_measurements_are_null(muscle: Muscle) -> None:
 
 
 def test_relative_srs_needs_a_reference_of_the_same_pca() -> None:
-    base = {"fibre": "f", "srs_test": 8.0, "measured_srs_test": 6.0, "recovery_s": 0.1}
+    measured = {"measured_srs_test": 6.0, "measured_srs_test_se": 0.3, "notes": []}
+    base = {"fibre": "f", "srs_test": 8.0, "recovery_s": 0.1, **measured}
     records = [
         {**base, "pca": 6.1, "amplitude_l0": 0.0383},
         {**base, "pca": 6.1, "amplitude_l0": 0.0, "srs_test": 10.0, "measured_srs_test": None},
@@ -145,3 +146,21 @@ def test_recordings_of_18dec2017a(shared_data: Path, repo_root: Path) -> None:
     results = replay([read_csv(f, mapping) for f in files], load_fibre("18Dec2017a"))
     whole = {r["pca"]: r["rmsd_f0"]["whole"] for r in results.records}
     assert whole == pytest.approx({4.5: 0.066, 6.1: 0.059, 6.3: 0.086, 6.6: 0.024, 9.0: 0.0019}, abs=0.002)
+
+
+def test_measured_numbers_come_with_errors_and_a_mark(muscle: Muscle) -> None:
+    """A slow ramp in loud hum: the value, its error and a mark; at 6 ms a dash, and a line that says why."""
+    protocol = StretchShortenStretch(0.0, 0.01, lead_s=0.5).trial("18Dec2017a", 9.0)
+    simulated = simulate_trial(muscle, protocol)
+    loud = simulated.force_n + 0.02 * np.sin(2.0 * np.pi * 50.0 * protocol.time_s)
+    entry = record(replace(protocol, force_time_s=protocol.time_s, force_n=loud), simulated, muscle.fibre)
+    assert entry["measured_srs_test_se"] > abs(entry["measured_srs_test"] - entry["srs_test"]) / 1.5
+    assert "srs_test_se" not in entry
+    text = table([{**entry, "measured_srs_test": 2.0, "measured_srs_test_se": 5.1}], "title")
+    assert "2.0 ± 5.1*" in text
+    assert "* standard error as large as the value or larger" in text
+    slow = replace(protocol, force_time_s=protocol.time_s[::6], force_n=loud[::6])
+    sparse = record(slow, simulated, muscle.fibre)
+    assert sparse["measured_srs_test"] is None
+    assert sparse["measured_isometric_force_f0_se"] > 0.0
+    assert "SRS of the test stretch, measured, of trial" in table([sparse], "title")

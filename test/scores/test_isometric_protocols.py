@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xb_muscle_ros.scores.enhancement import enhancement
-from xb_muscle_ros.scores.force_pca import fit_force_pca, hill_curve
-from xb_muscle_ros.scores.isometric import isometric_force
-from xb_muscle_ros.scores.redevelopment import redevelopment, restretch_end, still_until
-from xb_muscle_ros.trials.trial import Array, Phase
+from xb_muscle_ros.scores.enhancement import Enhancement, Side, enhancement
+from xb_muscle_ros.scores.estimate import Missing
+from xb_muscle_ros.scores.force_pca import ForcePca, fit_force_pca, hill_curve
+from xb_muscle_ros.scores.redevelopment import Redevelopment, redevelopment, restretch_end, still_until
+from xb_muscle_ros.trials.trial import Array
 
 PCA = np.array([4.5, 6.0, 6.2, 6.4, 6.6, 9.0])
 TIME = np.arange(6001) * 1e-3
@@ -20,7 +20,7 @@ TIME = np.arange(6001) * 1e-3
 @given(st.floats(5.9, 6.5), st.floats(1.5, 8.0), st.floats(0.0, 0.1))
 def test_a_hill_curve_is_found_again(pca50: float, n_hill: float, passive: float) -> None:
     found = fit_force_pca(PCA, hill_curve(PCA, pca50, n_hill, passive, 1.0))
-    assert found is not None
+    assert isinstance(found, ForcePca)
     assert found[:4] == pytest.approx((pca50, n_hill, passive, 1.0), abs=2e-3)
     assert found.rmsd_f0 < 1e-4
 
@@ -30,8 +30,8 @@ def test_standard_errors_are_those_of_repeated_noise() -> None:
     levels = np.linspace(5.0, 7.5, 16)
     truth = hill_curve(levels, 6.25, 3.0, 0.02, 1.0)
     fits = [fit_force_pca(levels, truth + 0.005 * rng.standard_normal(16)) for _ in range(300)]
-    values = np.array([[f.pca50, f.n_hill] for f in fits if f is not None])
-    told = np.array([[f.pca50_se, f.n_hill_se] for f in fits if f is not None], dtype=float)
+    values = np.array([[f.pca50, f.n_hill] for f in fits if isinstance(f, ForcePca)])
+    told = np.array([[f.pca50_se, f.n_hill_se] for f in fits if isinstance(f, ForcePca)], dtype=float)
     assert np.sqrt(np.mean(told**2, axis=0)) == pytest.approx(np.std(values, axis=0), rel=0.15)
 
 
@@ -45,12 +45,19 @@ def test_standard_errors_are_those_of_repeated_noise() -> None:
     ],
 )
 def test_no_curve_where_points_have_none(pca: Array, force: Array) -> None:
-    assert fit_force_pca(pca, force) is None
+    found = fit_force_pca(pca, force)
+    assert isinstance(found, Missing)
+    assert found.why
+
+
+def test_too_few_levels_are_told() -> None:
+    found = fit_force_pca(PCA[:3], hill_curve(PCA[:3], 6.2, 3.0, 0.0, 1.0))
+    assert found == Missing("isometric force is known at 3 levels of pCa; 5 are needed")
 
 
 def test_five_points_leave_a_standard_error_and_four_levels_none() -> None:
     found = fit_force_pca(PCA[:5], hill_curve(PCA[:5], 6.2, 3.0, 0.0, 1.0) + np.array([0, 0.01, 0, -0.01, 0]))
-    assert found is not None
+    assert isinstance(found, ForcePca)
     assert found.pca50_se is not None
     assert 0.0 < found.pca50_se < 0.2
 
@@ -94,7 +101,7 @@ def test_the_fit_ends_where_the_fibre_is_moved_again() -> None:
 @given(st.floats(0.5, 20.0))
 def test_the_rate_of_an_exponential_is_found_again(k: float) -> None:
     found = redevelopment(TIME, recovering(k), 1.02, 6.0)
-    assert found is not None
+    assert isinstance(found, Redevelopment)
     assert found.k_per_s == pytest.approx(k, rel=1e-6)
     assert found.end_f0 == pytest.approx(0.9, abs=1e-6)
 
@@ -109,7 +116,7 @@ def test_the_standard_error_of_k_tr_allows_for_slow_noise() -> None:
         for i in range(1, TIME.size):
             noise[i] = 0.98 * noise[i - 1] + white[i]
         found = redevelopment(TIME, recovering(3.0) + noise, 1.02, 6.0)
-        assert found is not None
+        assert isinstance(found, Redevelopment)
         rates.append(found.k_per_s)
         told.append(found.se_per_s)
     assert np.sqrt(np.mean(np.square(told))) == pytest.approx(np.std(rates), rel=0.3)
@@ -125,33 +132,31 @@ def test_the_standard_error_of_k_tr_allows_for_slow_noise() -> None:
     ],
 )
 def test_no_rate_where_force_does_not_redevelop(force: Array) -> None:
-    assert redevelopment(TIME, force, 1.02, 6.0) is None
+    found = redevelopment(TIME, force, 1.02, 6.0)
+    assert isinstance(found, Missing)
+    assert found.why
 
 
 def test_no_rate_of_a_short_record() -> None:
-    assert redevelopment(TIME, recovering(3.0), 1.02, 1.15) is None
+    found = redevelopment(TIME, recovering(3.0), 1.02, 1.15)
+    assert found == Missing("force is followed for 0.125 s after the restretch; 0.2 s are needed")
 
 
 def test_enhancement_by_hand() -> None:
     stretched, isometric = 1.2 + 0.0 * TIME, 0.9 + 0.0 * TIME[::10]
-    found = enhancement(TIME, stretched, TIME[::10], isometric, 3.0)
-    assert found is not None
-    assert found == pytest.approx((1.2, 0.9, 0.3, 1.0 / 3.0))
+    found = enhancement(Side(TIME, stretched), Side(TIME[::10], isometric), 3.0)
+    assert isinstance(found, Enhancement)
+    assert found[:4] == pytest.approx((1.2, 0.9, 0.3, 1.0 / 3.0))
+    assert found[4:] == (None, None)
 
 
 def test_enhancement_takes_the_mean_of_a_tenth_of_a_second() -> None:
     # Rising force: the mean over 2.95 to 3.05 s is that at 3 s.
-    found = enhancement(TIME, TIME, TIME, 1.0 + 0.0 * TIME, 3.0)
-    assert found is not None
+    found = enhancement(Side(TIME, TIME), Side(TIME, 1.0 + 0.0 * TIME), 3.0)
+    assert isinstance(found, Enhancement)
     assert found.stretched_f0 == pytest.approx(3.0)
 
 
 def test_no_enhancement_beyond_a_record() -> None:
-    assert enhancement(TIME, TIME, TIME[:100], TIME[:100], 3.0) is None
-
-
-def test_isometric_force_leaves_out_what_leaks_from_the_stretch() -> None:
-    phases = (Phase("isometric", 0.0, 1.0), Phase("test_stretch", 1.0, 1.1))
-    force = np.where(TIME <= 0.8, 0.5, 0.7)
-    assert isometric_force(TIME, force, phases) == pytest.approx(0.5)
-    assert isometric_force(TIME, force, phases[1:]) is None
+    found = enhancement(Side(TIME, TIME), Side(TIME[:100], TIME[:100]), 3.0)
+    assert found == Missing("the isometric trial has no force within 0.05 s of 3 s")

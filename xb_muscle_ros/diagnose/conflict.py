@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.cells import Residual
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise.model import NoiseModel
+from xb_muscle_ros.scores.noise.model import NoiseModel
 
 Array = npt.NDArray[np.float64]
 

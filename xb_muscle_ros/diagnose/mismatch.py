@@ -14,14 +14,14 @@ from xb_muscle_ros.diagnose.conflict import Conflict, conflicts
 from xb_muscle_ros.diagnose.flexible import flexible_fit
 from xb_muscle_ros.diagnose.kernel import Law, law
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise.model import NoiseModel
-from xb_muscle_ros.diagnose.noise.trials import noise_of
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.screen import Linear
 from xb_muscle_ros.diagnose.significance import Significance, significance
 from xb_muscle_ros.diagnose.study import Study
 from xb_muscle_ros.errors import naming
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.scores.noise.model import NoiseModel
+from xb_muscle_ros.scores.noise.trials import noise_of
 from xb_muscle_ros.trials.trial import Trial
 
 Array = npt.NDArray[np.float64]

@@ -148,8 +148,7 @@ def heldout_force(study: Study, explanation: Explanation, values: Mapping[str, f
     fixed = fault_coordinates([n.value for n in study_faults], [trial.name], [trial.solution], {})
     free = fault_coordinates([n.value for n in own], [trial.name], [trial.solution], {})
     # Where nothing ever moves, there is no force before: all of it is what is to be predicted.
-    before_s = trial.isometric_s if trial.isometric_s < trial.time_s[-1] else -np.inf
-    still = trial.force_time_s <= before_s
+    still = trial.steady & trial.moves
     coordinates = (*fixed, *free)
     z = np.array([*(values.get(c.label, 0.0) for c in fixed), *(0.0 for _ in free)])
     problem = Problem(fibre, (trial,), coordinates, {}, correction=study.correction(len(coordinates)))

@@ -14,8 +14,6 @@ from xb_muscle_ros.diagnose.crossval import HeldOut, folds_of, held_out
 from xb_muscle_ros.diagnose.mismatch import Recordings, rmsd, simulated
 from xb_muscle_ros.diagnose.names import MECHANISMS, Name, Verdict
 from xb_muscle_ros.diagnose.next_experiment import Proposal, propose
-from xb_muscle_ros.diagnose.noise.model import Source
-from xb_muscle_ros.diagnose.noise.trials import ENOUGH
 from xb_muscle_ros.diagnose.outcome import Outcome, write
 from xb_muscle_ros.diagnose.parsimony import kept_to_what_foretells
 from xb_muscle_ros.diagnose.plain import as_json
@@ -30,6 +28,8 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.start import with_constants
 from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
+from xb_muscle_ros.scores.noise.model import Source
+from xb_muscle_ros.scores.noise.trials import ENOUGH
 from xb_muscle_ros.trials.completing import Known
 from xb_muscle_ros.trials.study import read_study
 from xb_muscle_ros.trials.trial import Trial

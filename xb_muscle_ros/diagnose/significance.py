@@ -19,8 +19,8 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.cells import Cell, Residual, cut, exceeding, mean, phase_names, rms
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise.model import NoiseModel
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.scores.noise.model import NoiseModel
 
 Array = npt.NDArray[np.float64]
 

@@ -18,11 +18,12 @@ from xb_muscle_ros.models.fibre_file import Fibre, base_set, fibre_folders, load
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.offline import simulate_trial
 from xb_muscle_ros.scores.conditions import nominal
-from xb_muscle_ros.scores.enhancement import AFTER_S, enhancement
-from xb_muscle_ros.scores.isometric import isometric_force
+from xb_muscle_ros.scores.enhancement import AFTER_S, Side, enhancement
+from xb_muscle_ros.scores.estimate import Missing
+from xb_muscle_ros.scores.readout import read_off
 from xb_muscle_ros.scores.redevelopment import redevelopment, restretch_end, still_until
-from xb_muscle_ros.scores.rmsd import force_rmsd, windows
-from xb_muscle_ros.scores.stiffness import stiffness_of_phase
+from xb_muscle_ros.scores.rmsd import force_rmsd, short_windows, windows
+from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN, ForceNoise, force_noise
 from xb_muscle_ros.trials.bag_files import METADATA
 from xb_muscle_ros.trials.bag_reading import TrialBag
 from xb_muscle_ros.trials.completing import CONDITIONING_FOUND, Known, pca_of
@@ -123,7 +124,7 @@ def evaluate_bag(task: Mapping[str, Any]) -> Found:
             "notes": notes,
             "warnings": [line.replace(task["path"], task["bag"]) for line in trial.warnings],
             "trial": {"path": task["path"], **facts},
-            "measured": answer(trial, trial.force_time_s, trial.measured_f0),
+            "measured": _measured(trial),
             "models": {},
             "missing": [],
         }
@@ -144,16 +145,44 @@ def evaluate_bag(task: Mapping[str, Any]) -> Found:
     return found
 
 
-def answer(trial: Trial, time_s: Array, force_f0: Array) -> Found:
-    """What a force, measured or simulated, shows: SRS (F0/L0), isometric force (F0) and k_tr; None where it cannot."""
-    length = np.interp(time_s, trial.time_s, trial.length_change_l0)
-    phases = trial.phases_by_name()
-    return {
-        "srs_conditioning": stiffness_of_phase(time_s, length, force_f0, phases.get("conditioning_stretch")),
-        "srs_test": stiffness_of_phase(time_s, length, force_f0, phases.get("test_stretch")),
-        "isometric_f0": isometric_force(time_s, force_f0, trial.facts.phases),
-        "k_tr": _redeveloped(trial, time_s, force_f0),
-    }
+def answer(trial: Trial, time_s: Array, force_f0: Array, noise: ForceNoise | None = None) -> Found:
+    """What a force, measured or simulated, shows: SRS (F0/L0), isometric force (F0) and k_tr (1/s).
+
+    Args:
+        trial: lengths, phases, calcium.
+        time_s, force_f0: shape (n,), s and F0.
+        noise: of the force; None where it is simulated or its noise not known.
+
+    Returns:
+        values by name, None where there is none; standard errors under ``<name>_se``; ``why``: what is missing that
+        could be expected, and why, by name.
+    """
+    found: Found = {"why": {}}
+    for name, each in read_off(trial, time_s, force_f0, noise).items():
+        found[name], found[f"{name}_se"] = each.value, each.se
+        if each.why:
+            found["why"][name] = each.why
+    restretched = restretch_end(trial.time_s, trial.length_change_l0)
+    found["k_tr"] = None
+    if restretched is not None and np.ptp(trial.calcium_um) > 0.0:
+        found["why"]["k_tr"] = "calcium changes, so that force does not redevelop alone"
+    elif restretched is not None:
+        until = still_until(trial.time_s, trial.length_change_l0, restretched)
+        rate = redevelopment(time_s, force_f0, restretched, until, noise)
+        if isinstance(rate, Missing):
+            found["why"]["k_tr"] = rate.why
+        else:
+            found["k_tr"] = {"k_per_s": rate.k_per_s, "se_per_s": rate.se_per_s}
+    return found
+
+
+def _measured(trial: Trial) -> Found:
+    noise = force_noise(trial)
+    found = answer(trial, trial.force_time_s, trial.measured_f0, noise)
+    found["why"] |= {f"rmsd_{name}": why for name, why in short_windows(trial).items()}
+    if noise is None:
+        found["why"]["standard errors"] = NO_NOISE_KNOWN
+    return found
 
 
 def enhancement_task(stretched: Found, isometric: Found, shared: Task) -> Task:
@@ -176,7 +205,7 @@ def enhancement_task(stretched: Found, isometric: Found, shared: Task) -> Task:
 
 
 def evaluate_enhancement(task: Mapping[str, Any]) -> Found:
-    """Residual force enhancement of a pair of bags, measured and by each model; None where it cannot be had."""
+    """Residual force enhancement of a pair of bags, measured and by each model; ``why`` where it cannot be had."""
     stretched, isometric = (_trial(TrialBag(Path(task[name])), task)[0] for name in ("stretched", "isometric"))
     end_s = _stretch(stretched)[1]
     # Clocks are set by the begin of activation, where calcium tells it.
@@ -185,12 +214,13 @@ def evaluate_enhancement(task: Mapping[str, Any]) -> Found:
     found: Found = {"at_s": at_s, "models": {}}
     active = _active_at(stretched, at_s) and _active_at(isometric, at_s + shift)
 
-    def compare(time_a: Array, force_a: Array, time_b: Array, force_b: Array) -> dict[str, float | None] | None:
-        result = enhancement(time_a, force_a, time_b - shift, force_b, at_s) if active else None
-        return None if result is None else result._asdict()
+    def compare(a: Side, b: Side) -> Found:
+        if not active:
+            return {"why": f"calcium has fallen, or a trial ended, by {task['after_s']:g} s after the stretch"}
+        return enhancement(a, b._replace(time_s=b.time_s - shift), at_s)._asdict()
 
     found["measured"] = compare(
-        stretched.force_time_s, stretched.measured_f0, isometric.force_time_s, isometric.measured_f0
+        *(Side(trial.force_time_s, trial.measured_f0, force_noise(trial)) for trial in (stretched, isometric))
     )
     if task["measured_only"]:
         return found
@@ -200,7 +230,7 @@ def evaluate_enhancement(task: Mapping[str, Any]) -> Found:
         if muscle is not None:
             a, b = (simulate_trial(muscle, trial, settle_s=task["settle_s"]) for trial in (stretched, isometric))
             f0 = stretched.facts.f0_n, isometric.facts.f0_n
-            found["models"][name] = compare(a.time_s, a.force_n / f0[0], b.time_s, b.force_n / f0[1])
+            found["models"][name] = compare(Side(a.time_s, a.force_n / f0[0]), Side(b.time_s, b.force_n / f0[1]))
     return found
 
 
@@ -224,6 +254,8 @@ def _compared(trial: Trial, muscle: Muscle, settle_s: float | None) -> Found:
     force = simulated.force_n / trial.facts.f0_n
     at_measured = np.interp(trial.force_time_s, simulated.time_s, force)
     found = answer(trial, simulated.time_s, force)
+    if found["k_tr"] is not None:
+        found["k_tr"]["se_per_s"] = None  # no noise
     found["rmsd_f0"] = {
         name: force_rmsd(trial.force_time_s, at_measured, trial.measured_f0, window)
         for name, window in windows(trial).items()
@@ -270,15 +302,6 @@ def _activated_s(trial: Trial) -> float:
 def _active_at(trial: Trial, at_s: float) -> bool:
     now = int(np.searchsorted(trial.calcium_time_s, at_s, side="right")) - 1
     return at_s <= trial.time_s[-1] and now >= 0 and trial.calcium_um[now] >= _STILL_ACTIVE * np.max(trial.calcium_um)
-
-
-def _redeveloped(trial: Trial, time_s: Array, force_f0: Array) -> dict[str, float] | None:
-    restretched = restretch_end(trial.time_s, trial.length_change_l0)
-    if restretched is None or np.ptp(trial.calcium_um) > 0.0:
-        return None
-    until = still_until(trial.time_s, trial.length_change_l0, restretched)
-    found = redevelopment(time_s, force_f0, restretched, until)
-    return None if found is None else {"k_per_s": found.k_per_s, "se_per_s": found.se_per_s}
 
 
 @functools.lru_cache(maxsize=64)

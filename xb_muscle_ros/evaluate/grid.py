@@ -19,7 +19,8 @@ from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable, place
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0
-from xb_muscle_ros.scores.redevelopment import redevelopment
+from xb_muscle_ros.scores.estimate import Missing
+from xb_muscle_ros.scores.redevelopment import Redevelopment, redevelopment
 from xb_muscle_ros.scores.stiffness import WINDOW_S
 from xb_muscle_ros.trials.protocol import SPEED_L0_PER_S
 from xb_muscle_ros.trials.trial import Array
@@ -70,9 +71,8 @@ def simulate(task: Mapping[str, Any]) -> dict[str, Any]:
         task: of `tasks`.
 
     Returns:
-        ``srs_test`` (recovery x amplitude) and ``srs_conditioning``, F0/L0; ``isometric_f0``; ``k_tr``: rate and
-        standard error, 1/s, or None where force does not redevelop; ``k_tr_problem``: why the release cannot be
-        simulated, or None.
+        ``srs_test`` (recovery x amplitude) and ``srs_conditioning``, F0/L0; ``isometric_f0``; ``k_tr``: rate,
+        1/s, or None; ``k_tr_problem``: why force does not redevelop or the release cannot be simulated, or None.
 
     Raises:
         UserError, StateViolation: see `Muscle.settle` and `Muscle.step`.
@@ -92,7 +92,11 @@ def _simulated(muscle: Muscle, task: Mapping[str, Any]) -> dict[str, Any]:
             srs_test[i, j] = onset_stiffness(muscle, recovered, calcium)
     k_tr, problem = None, None
     try:
-        k_tr = _redeveloped(muscle, settled, calcium)
+        found = _redeveloped(muscle, settled, calcium)
+        if isinstance(found, Missing):
+            problem = found.why
+        else:
+            k_tr = {"k_per_s": found.k_per_s, "se_per_s": None, "why": ""}  # no noise, no error
     except UserError as error:
         # A hundred times as fast as the protocol: not every method follows, and nothing else depends on it.
         problem = str(error)
@@ -155,11 +159,10 @@ def onset_stiffness(muscle: Muscle, state: Array, calcium: float) -> float:
     return float(np.polyfit(lengths, force, 1)[0])
 
 
-def _redeveloped(muscle: Muscle, state: Array, calcium: float) -> dict[str, float] | None:
+def _redeveloped(muscle: Muscle, state: Array, calcium: float) -> Redevelopment | Missing:
     corner_s = np.cumsum([_RELEASE_RAMP_S, _RELEASED_S, _RELEASE_RAMP_S])
     away = _followed(muscle, state, corner_s, np.array([-_RELEASE_L0, -_RELEASE_L0, 0.0]), calcium)[-1]
     time_s = np.arange(1, round(_REDEVELOP_S * 1e3) + 1) * 1e-3
     states = _followed(muscle, away, time_s, 0.0 * time_s, calcium)
     force = muscle.outputs_of(states)["force_f0"]
-    found = redevelopment(time_s, force, 0.0, _REDEVELOP_S)
-    return None if found is None else {"k_per_s": found.k_per_s, "se_per_s": found.se_per_s}
+    return redevelopment(time_s, force, 0.0, _REDEVELOP_S)

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from xb_muscle_ros.evaluate.paper import NEED_RECORDINGS
-from xb_muscle_ros.evaluate.tables_text import NOTHING, markdown, number, plus_minus
+from xb_muscle_ros.evaluate.sections import left_out_lines
+from xb_muscle_ros.evaluate.tables_text import NOTHING, markdown, number, plus_minus, with_error
 from xb_muscle_ros.evaluate.trials import WINDOWS
 from xb_muscle_ros.scores.conditions import SETS
 
@@ -43,6 +44,8 @@ def write_up(sections: Mapping[str, Any]) -> str:
         if key in sections:
             parts += _srs(sections[key], title)
     parts += [text for text in (_force_pca(sections), _k_tr(sections), _enhancement(sections)) if text]
+    if sections.get("notes"):
+        parts.append("## What is missing\n\n" + "\n".join(f"- {line}" for line in sections["notes"]))
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
@@ -161,6 +164,7 @@ def _srs(section: Mapping[str, Any], title: str) -> Iterator[str]:
     yield f"## {title}" if shown else f"## {title}\n\nNo trial is one of the paper's 84 conditions."
     for reading in shown:
         yield f"RMSD {_READING_TEXT[reading]}:\n\n{srs_table_text(section, reading)}"
+    yield from (f"{line}." for line in left_out_lines(section))
     if shown and section["aic_note"]:
         yield section["aic_note"] + "."
 
@@ -190,18 +194,18 @@ def _force_pca(sections: Mapping[str, Any]) -> str:
         [
             r["fibre"],
             r["of"],
-            _with_se(r["pca50"], r["pca50_se"]),
-            _with_se(r["n_hill"], r["n_hill_se"], ".2f"),
+            with_error(r["pca50"], r["pca50_se"]),
+            with_error(r["n_hill"], r["n_hill_se"], ".2f"),
             *(number(r[key]) for key in ("passive_f0", "maximal_f0", "rmsd_f0")),
-            str(r["points"]),
+            number(r["points"], "d"),
         ]
         for r in sections["force_pca"]
     ]
     head = [
         "fibre",
         "of",
-        "pCa50 (SE)",
-        "Hill coefficient (SE)",
+        "pCa50 ± SE",
+        "Hill coefficient ± SE",
         "passive (F0)",
         "maximal (F0)",
         "RMSD (F0)",
@@ -212,13 +216,13 @@ def _force_pca(sections: Mapping[str, Any]) -> str:
 
 def _k_tr(sections: Mapping[str, Any]) -> str:
     rows = [
-        [r["fibre"], r["trial"], number(r["pca"], "g"), r["of"], _with_se(r["k_per_s"], r["se_per_s"], ".2f")]
+        [r["fibre"], r["trial"], number(r["pca"], "g"), r["of"], with_error(r["k_per_s"], r["se_per_s"], ".2f")]
         for r in sections["k_tr"]
     ]
     if not rows:
         return ""
     text = "## Rate of force redevelopment\n\n" + markdown(
-        ["fibre", "trial", "pCa", "of", "k_tr (SE), 1/s"], rows[:_MOST_ROWS]
+        ["fibre", "trial", "pCa", "of", "k_tr ± SE, 1/s"], rows[:_MOST_ROWS]
     )
     return text + (f"\n\n{len(rows) - _MOST_ROWS} more in evaluate.json." if len(rows) > _MOST_ROWS else "")
 
@@ -230,16 +234,23 @@ def _enhancement(sections: Mapping[str, Any]) -> str:
             r["isometric"],
             f"{100.0 * r['stretch_l0']:.1f}",
             r["of"],
-            *(number(r[key]) for key in ("stretched_f0", "isometric_f0", "enhancement_f0")),
-            number(_times(r["relative"], 100.0), ".1f"),
+            *(number(r[key]) for key in ("stretched_f0", "isometric_f0")),
+            with_error(r["enhancement_f0"], r["enhancement_se_f0"]),
+            with_error(_times(r["relative"], 100.0), _times(r["relative_se"], 100.0), ".1f"),
         ]
         for r in sections["residual_force_enhancement"]
     ]
-    head = ["stretched", "isometric", "stretch (% L0)", "of", "force (F0)", "isometric (F0)", "enhancement (F0)", "%"]
+    head = ["stretched", "isometric", "stretch (% L0)", "of", "force (F0)", "isometric (F0)"]
+    head += ["enhancement ± SE (F0)", "% ± SE"]
     if not rows:
         return ""
     after = sections["enhancement_after_s"]
-    return f"## Residual force enhancement, {after:g} s after the stretch\n\n" + markdown(head, rows[:_MOST_ROWS])
+    title = f"## Residual force enhancement, {after:g} s after the stretch"
+    note = (
+        "Each beside one isometric trial. The standard error is that of the noise; what a muscle does differently from "
+        "one trial to the next is not in it."
+    )
+    return f"{title}\n\n{note}\n\n{markdown(head, rows[:_MOST_ROWS])}"
 
 
 def _percent(held: Mapping[str, Any] | None) -> str:
@@ -248,7 +259,3 @@ def _percent(held: Mapping[str, Any] | None) -> str:
 
 def _times(value: float | None, factor: float) -> float | None:
     return None if value is None else factor * value
-
-
-def _with_se(value: float, se: float | None, form: str = ".3f") -> str:
-    return number(value, form) + ("" if se is None else f" ({number(se, form)})")

@@ -20,7 +20,8 @@ from xb_muscle_ros.evaluate.sets import ModelSet, file_serving, gather, null_lin
 from xb_muscle_ros.evaluate.srs_scores import ALL_READINGS, READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, read_table, read_tables
 from xb_muscle_ros.evaluate.tables_text import write_csv
-from xb_muscle_ros.evaluate.trials import Trials, duplicates, srs_table
+from xb_muscle_ros.evaluate.trials import MEASURED, Trials, duplicates, srs_table
+from xb_muscle_ros.figures.evaluate_srs import NOTHING_TO_DRAW, drawable
 from xb_muscle_ros.files import matching, write_text
 from xb_muscle_ros.models.fibre_file import fibre_folders, find_fibre_file, load_fibre
 from xb_muscle_ros.scores.enhancement import AFTER_S
@@ -108,6 +109,8 @@ def evaluate(request: Request, tell: Callable[[str], None] = lambda line: None) 
         _recordings(request, results, tell)
     if data is not None:
         _paper(request, results, data, golden)
+    if results.data and results.tables and not drawable(results.data, results.tables, results.sections["srs"]):
+        results.warnings.append(NOTHING_TO_DRAW)
     return results
 
 
@@ -141,7 +144,7 @@ def write_tables(out: Path, results: Results) -> list[Path]:
         table("force_rmsd.csv", sections.force_rows(found["force_rmsd"]), sections.FORCE_COLUMNS)
     if results.data is not None:
         table("relative_srs.csv", sections.relative_rows(results.tables, results.data), sections.RELATIVE_COLUMNS)
-        cells = {more_scores.MEASURED: results.data, **results.tables}
+        cells = {MEASURED: results.data, **results.tables}
         table("srs_cells.csv", sections.cell_rows(cells), sections.CELL_COLUMNS)
     if "paper" in found:
         table("srs_rmsd.csv", found["paper"]["readings"], list(found["paper"]["readings"][0]))
@@ -160,11 +163,9 @@ def draw_figures(out: Path, results: Results) -> list[Path]:
         made.append(out / "force_rmsd.png")
         draw_force(made[-1], force)
     if results.data is not None and results.tables:
-        titles = {each.name: each.title for each in results.models}
-        made.append(out / "relative_srs.png")
-        draw_srs(made[-1], results.data, results.tables, titles, results.sections["srs"])
-        surfaces = out / "srs_surfaces.png"
-        made += [surfaces] if draw_surfaces(surfaces, results.data, results.tables, titles) else []
+        profiles, surfaces = out / "relative_srs.png", out / "srs_surfaces.png"
+        made += [profiles] if draw_srs(profiles, results.data, results.tables, results.sections["srs"]) else []
+        made += [surfaces] if draw_surfaces(surfaces, results.data, results.tables) else []
     return made
 
 
@@ -201,7 +202,9 @@ def _recordings(request: Request, results: Results, tell: Callable[[str], None])
     found_sections["force_pca"] += more_scores.force_pca_of_trials(trials)
     found_sections["k_tr"] += more_scores.k_tr_rows(trials)
     _enhancement(request, results, made[0])
-    data = srs_table(trials, None, more_scores.MEASURED)
+    found_sections["notes"] = sections.notes(trials, found_sections)
+    results.warnings += found_sections["notes"]
+    data = srs_table(trials, None, MEASURED)
     if data is not None:
         results.data = data
         for each in results.models:
@@ -209,6 +212,7 @@ def _recordings(request: Request, results: Results, tell: Callable[[str], None])
             if table is not None:
                 results.tables[each.name] = table
         found_sections["srs"] = sections.srs_section(results.tables, data, results.models)
+        results.warnings += sections.left_out_lines(found_sections["srs"])
 
 
 def _of_bags(request: Request, results: Results, made: Sequence[Mapping[str, Any]]) -> Trials:
@@ -317,7 +321,7 @@ def _paper(request: Request, results: Results, data: SrsTable, golden: Mapping[s
             "recordings": bool(request.bags),
         },
     }
-    for label, table in [(more_scores.MEASURED, data), *tables.items()]:
+    for label, table in [(MEASURED, data), *tables.items()]:
         results.sections["force_pca"] += more_scores.force_pca_of_table(table, label)
 
 

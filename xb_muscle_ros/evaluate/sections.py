@@ -9,7 +9,6 @@ import numpy as np
 
 from xb_muscle_ros.evaluate import force_scores
 from xb_muscle_ros.evaluate.force_scores import Spread, models_of
-from xb_muscle_ros.evaluate.more_scores import MEASURED
 from xb_muscle_ros.evaluate.sets import ModelSet
 from xb_muscle_ros.evaluate.srs_scores import (
     READINGS,
@@ -20,19 +19,24 @@ from xb_muscle_ros.evaluate.srs_scores import (
     score,
 )
 from xb_muscle_ros.evaluate.srs_table import SrsTable
-from xb_muscle_ros.evaluate.trials import Trials
+from xb_muscle_ros.evaluate.trials import MEASURED, WINDOWS, Trials
 from xb_muscle_ros.scores.activation import CLASSES
+from xb_muscle_ros.scores.estimate import Estimate, notes_of, quotient, unsound
+from xb_muscle_ros.scores.readout import TEXT
+from xb_muscle_ros.trials.trial import Array
 
 TRIAL_COLUMNS = (
     "bag", "fibre", "trial", "pca", "amplitude_l0", "recovery_s", "of", "rmsd_whole", "rmsd_conditioning", "rmsd_test",
-    "srs_conditioning", "srs_test", "relative_srs", "isometric_f0", "k_tr", "k_tr_se",
+    "srs_conditioning", "srs_conditioning_se", "srs_test", "srs_test_se", "relative_srs", "relative_srs_se",
+    "isometric_f0", "isometric_f0_se", "k_tr", "k_tr_se", "why",
 )  # fmt: skip
 FORCE_COLUMNS = ("varied", "level", "model", "window", "mean_f0", "sd_f0", "fibres", "trials")
 RELATIVE_COLUMNS = (
     "reading", "of", "activation", "amplitude_l0", "recovery_s", "reduction", "relative_srs", "sd", "fibres",
 )  # fmt: skip
 CELL_COLUMNS = (
-    "of", "fibre", "pca", "activation", "isometric_f0", "recovery_s", "amplitude_l0", "srs_test", "relative_srs",
+    "of", "fibre", "pca", "activation", "isometric_f0", "recovery_s", "amplitude_l0", "srs_test", "srs_test_se",
+    "relative_srs", "relative_srs_se",
 )  # fmt: skip
 
 
@@ -96,6 +100,11 @@ def srs_section(tables: Mapping[str, SrsTable], data: SrsTable, models: Sequence
         "aic_relative_to": reference.model,
         "aic_note": reference.note,
         "readings": {name: reading._asdict() for name, reading in READINGS.items()},
+        "left_out": {
+            name: dict(zip(("left_out", "of"), data.left_out(reading.unconditioned), strict=True))
+            for name, reading in READINGS.items()
+        },
+        "repeats_left_out": data.repeats_left_out,
         "models": {},
     }
     for reading_name, reading in READINGS.items():
@@ -129,11 +138,12 @@ def cell_rows(tables: Mapping[str, SrsTable]) -> Iterator[dict[str, Any]]:
     for of, table in tables.items():
         for name, fibre in table.fibres.items():
             unconditioned = table.unconditioned(name, "reference")
+            error = table.unconditioned_se(name, "reference")
             classes, force = table.classes(name), table.isometric_f0(name)
             for i, j, k in np.ndindex(fibre.test.shape):
-                test = float(fibre.test[i, j, k])
-                if np.isfinite(test):
-                    below = float(unconditioned[i])
+                test = _estimate(fibre.test[i, j, k], None if fibre.test_se is None else fibre.test_se[i, j, k])
+                if test.value is not None:
+                    relative = quotient(test, _estimate(unconditioned[i], error[i]))
                     yield {
                         "of": of,
                         "fibre": name,
@@ -142,8 +152,10 @@ def cell_rows(tables: Mapping[str, SrsTable]) -> Iterator[dict[str, Any]]:
                         "isometric_f0": float(force[i]),
                         "recovery_s": float(table.recovery_s[j]),
                         "amplitude_l0": float(table.amplitude_l0[k]),
-                        "srs_test": test,
-                        "relative_srs": test / below if np.isfinite(below) and below else None,
+                        "srs_test": test.value,
+                        "srs_test_se": test.se,
+                        "relative_srs": relative.value,
+                        "relative_srs_se": relative.se,
                     }
 
 
@@ -155,7 +167,10 @@ def trial_rows(trials: Trials) -> Iterator[dict[str, Any]]:
         for of in (MEASURED, *models_of(trials)):
             values = trials.measured if of == MEASURED else trials.models[of]
             held = {name: float(column[i]) for name, column in values.items()}
-            below = float(values["srs_test"][partner[i]]) if partner[i] >= 0 else float("nan")
+            relative = _relative(values, i, partner[i])
+            why = dict(trials.why(i, of))
+            if relative.value is None and relative.why:
+                why["relative_srs"] = relative.why
             yield {
                 "bag": trials.bag[i],
                 "fibre": trials.fibre[i],
@@ -168,8 +183,70 @@ def trial_rows(trials: Trials) -> Iterator[dict[str, Any]]:
                 "rmsd_conditioning": None,
                 "rmsd_test": None,
                 **held,
-                "relative_srs": held["srs_test"] / below if below else None,
+                "relative_srs": relative.value,
+                "relative_srs_se": relative.se,
+                "why": "; ".join(f"{name}: {text}" for name, text in why.items()),
             }
+
+
+def _relative(values: Mapping[str, Array], i: int, reference: int) -> Estimate:
+    """Relative SRS of a trial; of a reference trial itself it is 1 without error."""
+    if reference < 0:
+        return Estimate(None)
+    test, below = (_estimate(values["srs_test"][k], values["srs_test_se"][k]) for k in (i, reference))
+    if reference == i and test.value:
+        return Estimate(1.0)
+    return quotient(test, below)
+
+
+def _estimate(value: float, se: float | None) -> Estimate:
+    known = se is not None and np.isfinite(se)
+    return (
+        Estimate(float(value), float(se) if known and se is not None else None)
+        if np.isfinite(value)
+        else Estimate(None)
+    )
+
+
+def notes(trials: Trials, section: Mapping[str, Any]) -> list[str]:
+    """Lines on what could be expected of the recordings and is not there, or is no better than its error."""
+    names = {**TEXT, "k_tr": "k_tr", **{f"rmsd_{name}": f"RMSD, {name}" for name in WINDOWS}}
+    told: list[tuple[str, str]] = []
+    for i in np.flatnonzero(trials.good).tolist():
+        measured = trials.why(i, MEASURED)
+        told += [(trials.trial[i], f"{names.get(name, name)}, measured: {why}") for name, why in measured.items()]
+        for of in models_of(trials):
+            own = {name: why for name, why in trials.why(i, of).items() if name not in measured}
+            told += [(trials.trial[i], f"{names.get(name, name)}, {of}: {why}") for name, why in own.items()]
+    lines = notes_of(told)
+    for name, text in TEXT.items():
+        pairs = zip(trials.measured[name][trials.good], trials.measured[f"{name}_se"][trials.good], strict=True)
+        known = [(float(value), float(se)) for value, se in pairs if np.isfinite(value)]
+        bad = sum(unsound(value, se) for value, se in known)
+        if bad:
+            lines.append(
+                f"{text}, measured: the standard error is as large as the value in {bad} of {len(known)} trials"
+            )
+    missing = {(row["fibre"], row["why"]) for row in section["force_pca"] if row["why"]}
+    lines += [f"force-pCa curve, fibre {fibre}: {why}" for fibre, why in sorted(missing)]
+    lines += [
+        f"residual force enhancement, {row['of']}, of trial {row['stretched']}: {row['why']}"
+        for row in section["residual_force_enhancement"]
+        if row["why"]
+    ]
+    return lines
+
+
+def left_out_lines(section: Mapping[str, Any]) -> list[str]:
+    """Lines on the measured SRS that are left out of means for their standard errors."""
+    repeats = section["repeats_left_out"]
+    lines = [f"SRS of the test stretch, measured: {repeats} repeats are left out of means for their standard errors"]
+    return lines[: bool(repeats)] + [
+        f"relative SRS, reading '{name}': {count['left_out']} of {count['of']} measured ones are left out of means, "
+        "because a standard error is as large as the unconditioned SRS"
+        for name, count in section["left_out"].items()
+        if count["left_out"]
+    ]
 
 
 def _reference_of(trials: Trials) -> list[int]:

@@ -40,11 +40,15 @@ class FibreSrs:
     Attributes:
         test, conditioning: SRS of the two stretches, F0/L0.
         isometric: force before the first stretch, F0.
+        test_se, conditioning_se: standard errors of the SRS, F0/L0, NaN where not known; None for simulated SRS, and
+            for tables that have none.
     """
 
     test: Array
     conditioning: Array
     isometric: Array
+    test_se: Array | None = None
+    conditioning_se: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +59,7 @@ class SrsTable:
         label: what the values are, for tables and figures.
         pca, recovery_s, amplitude_l0: the axes, 1-D; s and L0.
         fibres: by name.
+        repeats_left_out: trials that were left out of their condition's mean for their standard error.
     """
 
     label: str
@@ -62,6 +67,7 @@ class SrsTable:
     recovery_s: Array
     amplitude_l0: Array
     fibres: Mapping[str, FibreSrs]
+    repeats_left_out: int = 0
 
     def isometric_f0(self, fibre: str) -> Array:
         """Isometric force at each pCa, shape (pca,), F0: mean over the trials that have it."""
@@ -70,18 +76,56 @@ class SrsTable:
 
     def unconditioned(self, fibre: str, kind: str) -> Array:
         """SRS of the unconditioned stretch at each pCa, shape (pca,), F0/L0; kind is one of `UNCONDITIONED`."""
-        values = np.full(self.pca.size, np.nan)
+        return self._unconditioned(fibre, kind)[0]
+
+    def unconditioned_se(self, fibre: str, kind: str) -> Array:
+        """Its standard error, shape (pca,), F0/L0; NaN where not known."""
+        return self._unconditioned(fibre, kind)[1]
+
+    def _unconditioned(self, fibre: str, kind: str) -> tuple[Array, Array]:
+        values, errors = np.full(self.pca.size, np.nan), np.full(self.pca.size, np.nan)
+        held = self.fibres[fibre]
         if kind == "conditioning":
             column = _index(self.amplitude_l0, COMMON_AMPLITUDE_L0)
-            return values if column is None else nanmean(self.fibres[fibre].conditioning[:, :, column].T)
+            if column is None:
+                return values, errors
+            each = held.conditioning[:, :, column]
+            if held.conditioning_se is not None:
+                among = np.where(np.isfinite(each), held.conditioning_se[:, :, column] ** 2, 0.0).sum(axis=1)
+                errors = np.sqrt(among) / np.maximum(np.isfinite(each).sum(axis=1), 1)
+            return nanmean(each.T), errors
         column = _index(self.amplitude_l0, 0.0)
         if column is None:
-            return values
-        reference = self.fibres[fibre].test[:, np.argsort(self.recovery_s), column]
+            return values, errors
+        order = np.argsort(self.recovery_s)
+        reference = held.test[:, order, column]
         for i, row in enumerate(reference):
-            known = row[np.isfinite(row)]
-            values[i] = known[0] if known.size else np.nan
-        return values
+            known = np.flatnonzero(np.isfinite(row))
+            if known.size:
+                values[i] = row[known[0]]
+                errors[i] = np.nan if held.test_se is None else held.test_se[i, order[known[0]], column]
+        return values, errors
+
+    def sound(self, fibre: str, kind: str) -> npt.NDArray[np.bool_]:
+        """Which relative SRS say anything, shape (pca, recovery, amplitude).
+
+        Left out are those where the standard error of either SRS is as large as the unconditioned SRS that is divided
+        by. Whether the SRS of the test stretch is itself small plays no part: means would come out too high.
+        """
+        held = self.fibres[fibre]
+        below, below_se = (each[:, None, None] for each in self._unconditioned(fibre, kind))
+        test_se = np.full(held.test.shape, np.nan) if held.test_se is None else held.test_se
+        worse: npt.NDArray[np.bool_] = (test_se >= np.abs(below)) | (below_se >= np.abs(below))
+        return ~worse
+
+    def left_out(self, kind: str) -> tuple[int, int]:
+        """How many relative SRS are left out for their standard errors, and of how many."""
+        out, total = 0, 0
+        for name, held in self.fibres.items():
+            both = np.isfinite(held.test) & np.isfinite(self.unconditioned(name, kind))[:, None, None]
+            total += int(np.count_nonzero(both))
+            out += int(np.count_nonzero(both & ~self.sound(name, kind)))
+        return out, total
 
     def classes(self, fibre: str, by: SrsTable | None = None) -> npt.NDArray[np.int64]:
         """Activation class at each pCa, shape (pca,), from the fibre's force here, or in another table."""
@@ -122,7 +166,11 @@ class SrsTable:
 @functools.lru_cache(maxsize=256)
 def _pooled(table: SrsTable, kind: str, by: SrsTable | None) -> dict[str, ByClass]:
     return {
-        name: by_class(fibre.test, table.unconditioned(name, kind), table.classes(name, by))
+        name: by_class(
+            np.where(table.sound(name, kind), fibre.test, np.nan),
+            table.unconditioned(name, kind),
+            table.classes(name, by),
+        )
         for name, fibre in table.fibres.items()
     }
 

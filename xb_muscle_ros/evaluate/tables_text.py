@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.files import replaced
+from xb_muscle_ros.scores.estimate import error_text, mark
 
 NOTHING = "–"
 
@@ -21,6 +22,12 @@ def number(value: float | None, form: str = ".3f") -> str:
 def plus_minus(mean: float | None, sd: float | None, form: str = ".2f") -> str:
     """Mean ± s.d.; the mean alone where there is no s.d."""
     return number(mean, form) + ("" if sd is None or mean is None else f" ± {number(sd, form)}")
+
+
+def with_error(value: float | None, se: float | None, form: str = ".3f") -> str:
+    """A number ± its standard error, marked where that is as large; the number alone where it has none."""
+    text = number(value, form)
+    return text if text == NOTHING else text + error_text(se) + mark(value, se)
 
 
 def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -13,8 +13,10 @@ from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable
 from xb_muscle_ros.scores.conditions import AMPLITUDES_L0, CONDITIONS, RECOVERIES_S
 from xb_muscle_ros.trials.trial import Array
 
+MEASURED = "measured"
 WINDOWS = ("whole", "conditioning", "test")
-_ANSWERS = ("srs_conditioning", "srs_test", "isometric_f0", "k_tr", "k_tr_se")
+_READ_OFF = ("srs_conditioning", "srs_test", "isometric_f0")
+_ANSWERS = (*(f"{name}{end}" for name in _READ_OFF for end in ("", "_se")), "k_tr", "k_tr_se")
 MODEL_FIELDS = (*(f"rmsd_{window}" for window in WINDOWS), *_ANSWERS)
 # A table over more levels than this on an axis is one over the common conditions only.
 _MOST_LEVELS = 40
@@ -45,6 +47,7 @@ class Trials:
         self.unserved: dict[str, list[str]] = {}
         self.missing: dict[str, set[str]] = {}
         self._warnings: dict[int, list[str]] = {}
+        self._why: dict[int, dict[str, dict[str, str]]] = {}
         self._codes: dict[str, int] = {}
         self._code = np.full(bags, -1)
         self._shapes: dict[int, dict[str, Any]] = {}
@@ -78,6 +81,9 @@ class Trials:
             self.missing.setdefault(name, set()).add(facts["fibre"])
         if found["warnings"]:
             self._warnings[index] = list(found["warnings"])
+        told = {name: each["why"] for name, each in {MEASURED: found["measured"], **found["models"]}.items()}
+        if any(told.values()):
+            self._why[index] = {name: dict(why) for name, why in told.items()}
 
     @property
     def good(self) -> npt.NDArray[np.bool_]:
@@ -94,6 +100,10 @@ class Trials:
     def warnings(self) -> list[str]:
         """All warnings, in order of the bags."""
         return [line for index in sorted(self._warnings) for line in self._warnings[index]]
+
+    def why(self, index: int, of: str) -> dict[str, str]:
+        """What a trial lacks that could be expected, measured or by a model, and why."""
+        return self._why.get(index, {}).get(of, {})
 
     def refuse(self, index: int, problem: str) -> None:
         """Take a bag out."""
@@ -164,13 +174,17 @@ def srs_table(trials: Trials, model: str | None, label: str) -> SrsTable | None:
     ]
     used &= np.all([p >= 0 for p in places], axis=0)
     shape = (pca.size, recovery.size, amplitude.size)
-    fibres = {}
+    fibres, repeats_left_out = {}, 0
     for name in trials.fibres:
         mine = used & trials.is_of(name)
         cell = tuple(p[mine] for p in places)
-        held = [_mean_in_cells(values[q][mine], cell, shape) for q in ("srs_test", "srs_conditioning", "isometric_f0")]
-        fibres[name] = FibreSrs(test=held[0], conditioning=held[1], isometric=held[2])
-    return SrsTable(label, pca, recovery, amplitude, fibres)
+        (test, test_se, out), (conditioning, conditioning_se, _), (isometric, _, _) = (
+            _mean_in_cells(values[q][mine], values[f"{q}_se"][mine], cell, shape)
+            for q in ("srs_test", "srs_conditioning", "isometric_f0")
+        )
+        fibres[name] = FibreSrs(test, conditioning, isometric, test_se, conditioning_se)
+        repeats_left_out += out
+    return SrsTable(label, pca, recovery, amplitude, fibres, repeats_left_out)
 
 
 def _levels(values: Array, common: tuple[float, ...] | None) -> Array:
@@ -189,22 +203,35 @@ def _places(axis: Array, values: Array) -> npt.NDArray[np.int64]:
     return np.where(near, nearest, -1)
 
 
-def _mean_in_cells(values: Array, cell: tuple[npt.NDArray[np.int64], ...], shape: tuple[int, ...]) -> Array:
-    total, count = np.zeros(shape), np.zeros(shape)
+def _mean_in_cells(
+    values: Array, errors: Array, cell: tuple[npt.NDArray[np.int64], ...], shape: tuple[int, ...]
+) -> tuple[Array, Array, int]:
+    """Means, their standard errors, and how many repeats are left out.
+
+    Left out of a mean is a repeat with a standard error as large as the largest of them, where another has less:
+    repeats differ by more than their noise, so that weights by 1/SE² would leave little but one of them.
+    """
     some = np.isfinite(values)
-    at = tuple(index[some] for index in cell)
-    np.add.at(total, at, values[some])
+    values, errors, at = values[some], errors[some], tuple(index[some] for index in cell)
+    largest, least = np.zeros(shape), np.full(shape, np.inf)
+    np.maximum.at(largest, at, np.abs(values))
+    np.fmin.at(least, at, errors)
+    kept = ~((errors >= largest[at]) & (least[at] < largest[at]))
+    values, errors, at = values[kept], errors[kept], tuple(index[kept] for index in at)
+    total, count, squares = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    np.add.at(total, at, values)
     np.add.at(count, at, 1.0)
-    mean: Array = np.where(count > 0.0, total, np.nan) / np.maximum(count, 1.0)
-    return mean
+    np.add.at(squares, at, errors**2)
+    divisor = np.where(count > 0.0, count, np.nan)
+    return total / divisor, np.sqrt(squares) / divisor, int(np.count_nonzero(~kept))
 
 
 def _put(columns: dict[str, Array], index: int, values: Mapping[str, Any]) -> None:
-    for name in ("srs_conditioning", "srs_test", "isometric_f0"):
-        columns[name][index] = _number(values[name])
+    for name in _READ_OFF:
+        columns[name][index], columns[f"{name}_se"][index] = _number(values[name]), _number(values[f"{name}_se"])
     if values["k_tr"] is not None:
         columns["k_tr"][index] = values["k_tr"]["k_per_s"]
-        columns["k_tr_se"][index] = values["k_tr"]["se_per_s"]
+        columns["k_tr_se"][index] = _number(values["k_tr"]["se_per_s"])
 
 
 def _number(value: float | None) -> float:

@@ -85,7 +85,7 @@ def _panel(axes: tuple[Any, Any, Any], trace: Trace, after: str) -> dict[str, An
         top.margins(y=0.12)
     if trace.measured_f0 is not None:
         (handles["measured"],) = middle.plot(
-            *thinned(trace.time_s, trace.measured_f0), color=DATA, linewidth=2.8, label="measured"
+            *thinned(trace.time_s, trace.measured_f0), color=DATA, linewidth=1.0, label="measured"
         )
     bottom.axhline(0.0, color="black", linewidth=0.5)
     for name, values, colour, style, width in _models(trace, after):

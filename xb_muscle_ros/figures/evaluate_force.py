@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.figures.evaluate_look import look, shade
+from xb_muscle_ros.figures.evaluate_look import label, look, shade
 from xb_muscle_ros.figures.style import figure, save
 
 _WINDOWS = {"whole": "Whole protocol", "conditioning": "Conditioning stretch", "test": "Test stretch"}
@@ -43,7 +43,7 @@ def draw_force(path: Path, section: Mapping[str, Any]) -> None:
             axes[0][column].set_title(f"{'ABCD'[column]}  effect of {_VARIED[varied]}\n", loc="left", fontweight="bold")
             axes[0][column].text(0.0, 1.03, _ends(varied, entries), transform=axes[0][column].transAxes, fontsize=7)
         for axis in axes[-1]:
-            axis.set_xticks(range(len(models)), [name.replace("_", " ") for name in models], rotation=35, ha="right")
+            axis.set_xticks(range(len(models)), [label(name) for name in models], rotation=35, ha="right")
         for axis in axes[:-1].flat:
             axis.set_xticks(range(len(models)), [""] * len(models))
         save(made, path)
@@ -53,6 +53,9 @@ def _overall(axis: Any, section: Mapping[str, Any], models: Sequence[str], windo
     top = 0.0
     for k, name in enumerate(models):
         top = max(top, _bar(axis, k, 0.6, section["overall"][name][window], look(name).colour, look(name).hollow))
+    axis.set_xlim(-0.6, len(models) - 0.4)
+    if top == 0.0 and not any(section["overall"][name][window] for name in models):
+        axis.text(0.5, 0.5, "no such stretch", transform=axis.transAxes, ha="center", va="center")
     height = top
     for test in section["paired_t_tests"]["comparisons"]:
         if test["window"] == window and test["significant"]:
@@ -63,6 +66,7 @@ def _overall(axis: Any, section: Mapping[str, Any], models: Sequence[str], windo
 
 
 def _slice(axis: Any, varied: str, entries: Sequence[Mapping[str, Any]], models: Sequence[str], window: str) -> None:
+    axis.set_xlim(-0.6, len(models) - 0.4)
     width = 0.84 / len(entries)
     ordered = _ordered(varied, entries)
     for k, name in enumerate(models):

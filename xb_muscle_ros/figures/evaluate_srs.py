@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.evaluate.srs_errors import pooled_error
 from xb_muscle_ros.evaluate.srs_scores import READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, place
-from xb_muscle_ros.figures.evaluate_look import MEASURED, look, shade
+from xb_muscle_ros.figures.evaluate_look import MEASURED, label, look, shade
 from xb_muscle_ros.figures.style import figure, save
 from xb_muscle_ros.scores.activation import CLASSES, activation_class
 from xb_muscle_ros.scores.conditions import (
@@ -19,6 +20,7 @@ from xb_muscle_ros.scores.conditions import (
     COMMON_RECOVERY_S,
     LARGE_ABOVE_L0,
     LARGE_BELOW_S,
+    RECOVERIES_S,
     SETS,
 )
 from xb_muscle_ros.scores.relative import nanmean, nansd
@@ -26,26 +28,32 @@ from xb_muscle_ros.trials.trial import Array
 
 _READING = READINGS["released"]
 _TOP = 1.75
+_ALONG = ("activation", "amplitude", "recovery")
+# Where a reading's bar stands beside a model's place.
+_SIDES = {"text": -0.2, "released": 0.2}
 
 
 class _Profile:
-    """Relative SRS along one axis: shape (fibres, points), with x of the same shape or (points,)."""
+    """Relative SRS along one axis and its standard errors, NaN where not known: shape (fibres, points), as x."""
 
     def __init__(self, table: SrsTable, along: str) -> None:
-        pooled = list(table.pooled(_READING.unconditioned).values())
-        each = np.array([p.test / np.where(p.unconditioned == 0.0, np.nan, p.unconditioned) for p in pooled])
+        pooled = table.pooled(_READING.unconditioned)
+        each = np.array([p.test / np.where(p.unconditioned == 0.0, np.nan, p.unconditioned) for p in pooled.values()])
+        error = np.array([pooled_error(table, name, _READING.unconditioned, p) for name, p in pooled.items()])
         j, k = place(table.recovery_s, COMMON_RECOVERY_S), place(table.amplitude_l0, COMMON_AMPLITUDE_L0)
         level = CLASSES.index(COMMON_CLASS)
         empty = np.empty((each.shape[0], 0))
         if along == "activation":
-            self.y = empty if j is None or k is None else each[:, :, j, k]
+            self.y, self.se = (empty if j is None or k is None else of[:, :, j, k] for of in (each, error))
             self.x = np.array([_class_force(table, name) for name in table.fibres])[:, : self.y.shape[1]]
         elif along == "amplitude":
             moved = table.amplitude_l0 > 0.0
-            self.y = empty if j is None else each[:, level, j, moved] if moved.any() else empty
+            self.y, self.se = (
+                empty if j is None or not moved.any() else of[:, level, j, moved] for of in (each, error)
+            )
             self.x = 100.0 * table.amplitude_l0[moved]
         else:
-            self.y = empty if k is None else each[:, level, :, k]
+            self.y, self.se = (empty if k is None else of[:, level, :, k] for of in (each, error))
             self.x = table.recovery_s
         if self.x.ndim == 1:
             self.x = np.broadcast_to(self.x[: self.y.shape[1]], self.y.shape)
@@ -58,22 +66,40 @@ class _Profile:
         return x[some], y[some], sd[some]
 
 
-def draw_srs(
-    path: Path, data: SrsTable, tables: Mapping[str, SrsTable], titles: Mapping[str, str], section: Mapping[str, Any]
-) -> None:
+NOTHING_TO_DRAW = (
+    f"relative_srs.png is not drawn: no trial with {100 * COMMON_AMPLITUDE_L0:g} % L0 or {COMMON_RECOVERY_S:g} s has a "
+    "relative SRS, and no condition is one of the paper's"
+)
+
+
+def drawable(data: SrsTable, tables: Mapping[str, SrsTable], section: Mapping[str, Any]) -> bool:
+    """Whether there is anything to draw; see `draw_srs`."""
+    profiles = (_Profile(table, along) for table in (data, *tables.values()) for along in _ALONG)
+    scores = (of[reading]["rmsd"][which] for of in section["models"].values() for reading in _SIDES for which in SETS)
+    return any(profile.means()[0].size for profile in profiles) or any(score is not None for score in scores)
+
+
+def draw_srs(path: Path, data: SrsTable, tables: Mapping[str, SrsTable], section: Mapping[str, Any]) -> bool:
     """Draw profiles of relative SRS (A to C) and its RMSD by model (D to F); PNG, and PDF beside it.
+
+    Dots are measured fibres with the standard errors of their relative SRS, where known; larger symbols their means
+    with the s.d. over fibres.
 
     Args:
         path: of the PNG.
         data: measured SRS.
         tables: simulated SRS by model.
-        titles: what the models are called.
         section: ``srs`` of ``evaluate.json``.
+
+    Returns:
+        whether anything was drawn: an empty figure is not written.
     """
+    if not drawable(data, tables, section):
+        return False
     with figure(180.0, 125.0) as made:
         axes = made.subplots(2, 3, sharey="row")
-        for axis, along in zip(axes[0], ("activation", "amplitude", "recovery"), strict=True):
-            _profile(axis, along, data, tables, titles)
+        for axis, along in zip(axes[0], _ALONG, strict=True):
+            _profile(axis, along, data, tables)
         for axis, which in zip(axes[1], SETS, strict=True):
             _bars(axis, which, section)
         axes[0][0].set_ylabel("Relative SRS")
@@ -85,20 +111,36 @@ def draw_srs(
         made.legend(
             [handles[k] for k in order], [labels[k] for k in order], loc="outside upper center", ncols=4, frameon=False
         )
-        axes[1][0].text(
-            0.98, 0.97, "open: reading 'text'\nfilled: 'released'", transform=axes[1][0].transAxes, ha="right",
-            va="top", fontsize=6.5,
+        # Room for the words above the bars.
+        axes[1][0].set_ylim(0.0, 1.3 * axes[1][0].get_ylim()[1])
+        axes[1][0].text(0.98, 0.97, _readings_text(section), transform=axes[1][0].transAxes, ha="right", va="top",
+            fontsize=6.5,
         )  # fmt: skip
         save(made, path)
+    return True
 
 
-def _profile(axis: Any, along: str, data: SrsTable, tables: Mapping[str, SrsTable], titles: Mapping[str, str]) -> None:
+def _readings_text(section: Mapping[str, Any]) -> str:
+    """What open and filled bars are, as far as there are any."""
+    words = {"text": "open: reading 'text'", "released": "filled: reading 'released'"}
+    shown = [
+        words[reading]
+        for reading in _SIDES
+        if any(of[reading]["rmsd"][which] is not None for of in section["models"].values() for which in SETS)
+    ]
+    return "\n".join(shown)
+
+
+def _profile(axis: Any, along: str, data: SrsTable, tables: Mapping[str, SrsTable]) -> None:
     axis.axhline(1.0, color="black", linewidth=0.6, linestyle=(0, (1, 2)))
     measured = _Profile(data, along)
     shown = np.where(np.abs(measured.y) < 10.0, measured.y, np.nan)
-    axis.plot(measured.x.ravel(), shown.ravel(), ".", color="black", markersize=1.8, zorder=2)
+    axis.errorbar(
+        measured.x.ravel(), shown.ravel(), np.where(np.isfinite(measured.se), measured.se, 0.0).ravel(), fmt=".",
+        color="black", markersize=1.8, linewidth=0.5, zorder=2,
+    )  # fmt: skip
     x, y, sd = measured.means()
-    tested = x.size > 0
+    every = [x]
     large = _large(along, x)
     for filled in (True, False):
         some = large == filled
@@ -110,13 +152,14 @@ def _profile(axis: Any, along: str, data: SrsTable, tables: Mapping[str, SrsTabl
     for name, table in tables.items():
         way = look(name)
         x, y, _ = _Profile(table, along).means()
-        tested |= x.size > 0
+        every.append(x)
         order = np.argsort(x)
         axis.plot(
             x[order], y[order], color=way.colour, linestyle=way.line, linewidth=1.2, marker=way.marker, markersize=3.2,
-            markerfacecolor="white" if way.hollow else way.colour, label=titles.get(name, name), zorder=3,
+            markerfacecolor="white" if way.hollow else way.colour, label=label(name), zorder=3,
         )  # fmt: skip
     axis.set_ylim(0.0, _TOP)
+    tested = np.concatenate(every)
     text = {
         "activation": ("Isometric force (F$_0$)", f"{100 * COMMON_AMPLITUDE_L0:g} % L$_0$, {COMMON_RECOVERY_S:g} s"),
         "amplitude": ("Amplitude (% L$_0$)", f"{COMMON_CLASS} activation, {COMMON_RECOVERY_S:g} s"),
@@ -125,10 +168,14 @@ def _profile(axis: Any, along: str, data: SrsTable, tables: Mapping[str, SrsTabl
     axis.set_xlabel(text[0])
     axis.text(0.98, 0.97, text[1], transform=axis.transAxes, ha="right", va="top", fontsize=6.5)
     axis.set_title(along, loc="left")
-    if not tested:
+    if not tested.size:
         axis.text(0.5, 0.5, "not tested", transform=axis.transAxes, ha="center", va="center")
     elif along == "recovery":
         axis.set_xscale("log")
+        # A single time would stand in the middle of one decade.
+        axis.set_xlim(0.5 * min(RECOVERIES_S[0], float(np.min(tested))), 2.0 * max(1.0, float(np.max(tested))))
+    else:
+        axis.set_xlim(0.0, 1.08 * float(np.max(tested)))
 
 
 def _large(along: str, x: Array) -> Any:
@@ -149,7 +196,7 @@ def _class_force(table: SrsTable, fibre: str) -> Array:
 def _bars(axis: Any, which: str, section: Mapping[str, Any]) -> None:
     models = list(section["models"])
     for k, name in enumerate(models):
-        for side, reading in ((-0.2, "text"), (0.2, "released")):
+        for reading, side in _SIDES.items():
             value = section["models"][name][reading]["rmsd"][which]
             if value is not None:
                 way = look(name)
@@ -158,6 +205,9 @@ def _bars(axis: Any, which: str, section: Mapping[str, Any]) -> None:
                     k + side, value, 0.36, color=fill if reading == "released" else "white", edgecolor=way.colour,
                     linewidth=1.0, hatch="////" if way.hollow else None,
                 )  # fmt: skip
-    axis.set_xticks(range(len(models)), [name.replace("_", " ") for name in models], rotation=35, ha="right")
+    axis.set_xticks(range(len(models)), [label(name) for name in models], rotation=35, ha="right")
+    axis.set_xlim(-0.6, len(models) - 0.4)
+    if all(of[reading]["rmsd"][which] is None for of in section["models"].values() for reading in _SIDES):
+        axis.text(0.5, 0.5, "not tested", transform=axis.transAxes, ha="center", va="center")
     axis.set_title(f"{which} reductions" if which != "all" else "all conditions", loc="left")
     axis.set_ylim(bottom=0.0)

@@ -10,6 +10,7 @@ import numpy as np
 
 from xb_muscle_ros.evaluate.srs_scores import READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable
+from xb_muscle_ros.figures.evaluate_look import label
 from xb_muscle_ros.figures.style import figure, save
 from xb_muscle_ros.scores.activation import CLASSES
 from xb_muscle_ros.scores.conditions import Mask
@@ -28,7 +29,7 @@ def submaximal(table: SrsTable) -> Array:
     return nanmean(centre[[CLASSES.index(name) for name in _SUBMAXIMAL]])
 
 
-def draw_surfaces(path: Path, data: SrsTable, tables: Mapping[str, SrsTable], titles: Mapping[str, str]) -> list[str]:
+def draw_surfaces(path: Path, data: SrsTable, tables: Mapping[str, SrsTable]) -> list[str]:
     """Draw a panel for each model with the measured conditions as dots; PNG, and PDF beside it.
 
     Stems lead from a dot to the model's surface. A model without at least two amplitudes and two recovery times has no
@@ -42,13 +43,19 @@ def draw_surfaces(path: Path, data: SrsTable, tables: Mapping[str, SrsTable], ti
         return []
     columns = min(_COLUMNS, len(shown))
     rows = -(-len(shown) // columns)
-    with figure(24.0 + 60.0 * columns, 8.0 + 52.0 * rows) as made:
+    # Automatic layout fails on a single 3-D panel beside a colour bar; places are given in mm.
+    width, height = 30.0 + 62.0 * columns, 8.0 + max(54.0 * rows, 70.0)
+    with figure(width, height) as made:
+        made.set_layout_engine(None)
+        made.subplots_adjust(left=0.01, right=1.0 - 30.0 / width, bottom=8.0 / height, top=1.0 - 7.0 / height)
+        made.subplots_adjust(wspace=0.12, hspace=0.14)
         axes = [made.add_subplot(rows, columns, k + 1, projection="3d") for k in range(len(shown))]
         for axis, name in zip(axes, shown, strict=True):
             drawn = _panel(axis, data, tables[name])
-            axis.set_title(titles.get(name, name), fontsize=8, y=1.02)
-            axis.set_box_aspect((1.0, 1.0, 0.75), zoom=1.12)
-        bar = made.colorbar(drawn, ax=axes, shrink=0.6, aspect=25, pad=0.06)
+            axis.set_title(label(name), fontsize=8, y=1.02)
+            axis.set_box_aspect((1.0, 1.0, 0.75), zoom=1.05)
+        place = made.add_axes((1.0 - 18.0 / width, 0.5 - 28.0 / height, 3.0 / width, 56.0 / height))
+        bar = made.colorbar(drawn, cax=place)
         bar.set_label("Relative SRS, low and intermediate activation")
         save(made, path)
     return shown

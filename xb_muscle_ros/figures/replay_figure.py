@@ -12,6 +12,10 @@ from xb_muscle_ros.trials.simulated import Simulated
 from xb_muscle_ros.trials.trial import Trial
 
 _PER_PAGE = 9
+# Wide lines would show more noise than there is, points.
+_LINE = 0.8
+# Lengths that are held would fill their panel with noise, % L0.
+_LEAST_RANGE = 2.0
 _LOOK = Look((1, 3), 0.05, "ΔL (% L$_0$)", "Force (F$_0$)", row_mm=58.0, extra_mm=12.0)
 
 
@@ -55,9 +59,10 @@ def _page(
 
 def _panel(upper: Any, lower: Any, trial: Trial, simulated: Simulated, label: str, live: Simulated | None) -> list[Any]:
     facts = trial.facts
-    upper.plot(trial.time_s, 100.0 * trial.length_change_l0, color="black", linewidth=1.0)
+    upper.plot(trial.time_s, 100.0 * trial.length_change_l0, color="black", linewidth=_LINE)
     upper.tick_params(labelbottom=False)
-    title = facts.trial if facts.pca is None else f"{facts.trial}  (pCa {facts.pca:g})"
+    _at_least(upper, _LEAST_RANGE)
+    title = facts.trial if facts.pca is None else f"{facts.trial}  (pCa {facts.pca:.3g})"
     upper.set_title(title, loc="left", fontsize=7.5)
     for phase in facts.phases:
         if "stretch" in phase.name:
@@ -65,8 +70,8 @@ def _panel(upper: Any, lower: Any, trial: Trial, simulated: Simulated, label: st
                 axes.axvspan(phase.start_s, phase.end_s, color=SHADE, linewidth=0)
     lines = []
     if trial.force_time_s.size:
-        lines += lower.plot(trial.force_time_s, trial.measured_f0, color=DATA, linewidth=3.0, label="measured")
-    lines += lower.plot(simulated.time_s, simulated.force_n / facts.f0_n, color=MODEL, label=label)
+        lines += lower.plot(trial.force_time_s, trial.measured_f0, color=DATA, linewidth=_LINE, label="measured")
+    lines += lower.plot(simulated.time_s, simulated.force_n / facts.f0_n, color=MODEL, linewidth=_LINE, label=label)
     if live is not None:
         lines += lower.plot(
             live.time_s, live.force_n / facts.f0_n, color=SECOND, linestyle=(0, (1, 3)), linewidth=1.8,
@@ -74,3 +79,10 @@ def _panel(upper: Any, lower: Any, trial: Trial, simulated: Simulated, label: st
         )  # fmt: skip
     lower.set_ylim(bottom=min(0.0, lower.get_ylim()[0]))
     return lines
+
+
+def _at_least(axis: Any, least: float) -> None:
+    """Widen an axis that shows less."""
+    low, high = axis.get_ylim()
+    if high - low < least:
+        axis.set_ylim(0.5 * (low + high - least), 0.5 * (low + high + least))

@@ -9,7 +9,7 @@ from typing import Any
 
 from xb_muscle_ros.files import replaced
 
-# Data are grey and wide, models dark and thin: told apart without colour. Hues after Okabe and Ito.
+# Data are grey, models dark: told apart without colour. Hues after Okabe and Ito.
 DATA = "#9a9a9a"
 MODEL = "#0b4f8a"
 SECOND = "#c1440e"

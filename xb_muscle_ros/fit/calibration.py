@@ -36,10 +36,10 @@ def calibrated_force(problem: Problem, z: Array, trial: FitTrial) -> tuple[Array
         trial: one whose solution the fit did not see.
 
     Returns:
-        recorded force at the times that count, F0, and the shift; None where the trial has no isometric phase, or the
-        model no solution.
+        recorded force at the times that count, F0, and the shift; None where the trial has no steady isometric force
+        before the first change of length, or the model no solution.
     """
-    inside = trial.force_time_s <= trial.isometric_s
+    inside = trial.steady
     if np.count_nonzero(inside) < 3:
         return None
     muscle, faults = Muscle(problem.fibre_at(z)), problem.faults_at(z, trial)

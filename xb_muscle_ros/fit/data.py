@@ -12,6 +12,7 @@ import numpy.typing as npt
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.replay.offline import calcium_per_step
 from xb_muscle_ros.scores.rmsd import windows
+from xb_muscle_ros.scores.steady import steady_part
 from xb_muscle_ros.trials.ros_types import to_ns
 from xb_muscle_ros.trials.trial import Trial
 
@@ -30,7 +31,9 @@ class FitTrial:
         order: how many trials of the fibre came before it.
         held_out: whether it is kept out of the fit.
         weight: of its squared error.
-        isometric_s: end of the isometric phase that the trial begins with, s; its start where it begins with none.
+        steady_s: begin and end of the steady isometric force before the first change of length, s, see
+            `scores.steady`; None where there is none.
+        moves: whether length changes at all.
         time_s, length_l0, calcium_um: shape (n,); calcium acts in the step that ends at a sample.
         force_time_s, measured_f0: shape (k,); the force that counts, within the trial's window.
     """
@@ -40,12 +43,20 @@ class FitTrial:
     order: int
     held_out: bool
     weight: float
-    isometric_s: float
+    steady_s: tuple[float, float] | None
+    moves: bool
     time_s: Array
     length_l0: Array
     calcium_um: Array
     force_time_s: Array
     measured_f0: Array
+
+    @property
+    def steady(self) -> npt.NDArray[np.bool_]:
+        """Which of the force that counts is steady before the first change of length, shape (k,)."""
+        begin, end = self.steady_s or (np.inf, -np.inf)
+        inside: npt.NDArray[np.bool_] = (self.force_time_s >= begin) & (self.force_time_s <= end)
+        return inside
 
     @property
     def dt_s(self) -> Array:
@@ -113,13 +124,15 @@ def _fit_trial(trial: Trial, order: int, held_out: bool, whole: bool, weight: fl
     # Nothing after the window bears on the force within it.
     last = min(int(np.searchsorted(trial.time_s, late - 5e-10)) + 1, trial.time_s.size)
     pca, phases = trial.facts.pca, trial.facts.phases
+    steady, why = steady_part(trial, trial.force_time_s, trial.measured_f0)
     return FitTrial(
         name=name,
         solution="changing" if pca is None else f"pCa {pca:g}",
         order=order,
         held_out=held_out,
         weight=weight,
-        isometric_s=float(phases[0].end_s if phases and phases[0].name == "isometric" else trial.time_s[0]),
+        steady_s=None if why else (float(trial.force_time_s[steady][0]), float(trial.force_time_s[steady][-1])),
+        moves=len(phases) > 1,
         time_s=trial.time_s[:last],
         length_l0=trial.length_change_l0[:last],
         calcium_um=calcium_per_step(trial)[:last],

@@ -13,13 +13,19 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import matmul_toeplitz, solve_toeplitz
 from scipy.signal import lfilter
+
+from xb_muscle_ros.scores.noise.autocovariance import (
+    ORDER,
+    autocovariance,
+    covariance_of_sums,
+    extended,
+    sample_autocovariance,
+    yule_walker,
+)
 
 Array = npt.NDArray[np.float64]
 
-# Autoregression of this order catches both slow misfit and the hum of 40 to 80 Hz in real recordings at 1 kHz.
-_ORDER = 6
 # Rounds of correcting for what the fit took, draws in each, and samples until a drawn noise forgets how it began.
 _ROUNDS, _DRAWS, _BURN_IN = 3, 60, 600
 # Far finer than any sampling of the noise matters; also where no noise was added at all.
@@ -42,42 +48,9 @@ class Scale(NamedTuple):
 FIRST = Scale(0.01, 40.0)
 
 
-def sample_autocovariance(residual: Array, order: int) -> Array:
-    """Mean product of samples at lags 0 to `order` of the last axis, shape (..., order + 1)."""
-    n = residual.shape[-1]
-    products = [np.sum(residual[..., : n - k] * residual[..., k:], axis=-1) / n for k in range(order + 1)]
-    return np.stack(products, axis=-1)
-
-
-def extended(sample: Array, lags: int) -> Array:
-    """Autocovariance at lags 0 to `lags` - 1 of the autoregression that begins with this one, shape (lags,)."""
-    order = sample.size - 1
-    if sample[0] <= 0.0:
-        return np.zeros(lags)
-    weights = _weights(sample)
-    out = np.zeros(max(lags, order + 1))
-    out[: order + 1] = sample
-    for k in range(order + 1, lags):
-        out[k] = weights @ out[k - order : k][::-1]
-    return out[:lags]
-
-
-def autocovariance(residual: Array, lags: int) -> Array:
-    """Autocovariance of one trial's residual at lags 0 to `lags` - 1, shape (lags,), by an autoregression."""
-    return extended(sample_autocovariance(residual, min(_ORDER, residual.size // 10)), lags)
-
-
-def _weights(sample: Array) -> Array:
-    """Weights of the autoregression (Yule-Walker); a trace of white noise keeps the equations regular."""
-    regular = sample.copy()
-    regular[0] *= 1.0 + 1e-6
-    weights: Array = solve_toeplitz(regular[:-1], regular[1:])
-    return weights
-
-
 def _stable(sample: Array) -> bool:
     """Whether there is noise with this autocovariance that does not grow."""
-    roots = np.roots(np.concatenate([[1.0], -_weights(sample)]))
+    roots = np.roots(np.concatenate([[1.0], -yule_walker(sample)]))
     return bool(np.all(np.abs(roots) < 1.0))
 
 
@@ -94,7 +67,7 @@ def noise_autocovariances(residuals: Sequence[Array], left: Callable[[Array], Ar
     """
     if not residuals:
         return []
-    order = min([_ORDER, *(r.size // 10 for r in residuals)])
+    order = min([ORDER, *(r.size // 10 for r in residuals)])
     found = np.array([sample_autocovariance(r, order) for r in residuals])
     if not np.any(found[:, 0] > 0.0):
         return [np.zeros(r.size) for r in residuals]
@@ -128,7 +101,7 @@ def _drawn(sample: Array, n: int, random: np.random.Generator) -> Array:
     """Noise of an autocovariance, shape (n, draws)."""
     if sample[0] <= 0.0:
         return np.zeros((n, _DRAWS))
-    weights = _weights(sample)
+    weights = yule_walker(sample)
     fresh = max(float(sample[0] - weights @ sample[1:]), 0.0) ** 0.5
     white = fresh * random.normal(size=(n + _BURN_IN, _DRAWS))
     noise: Array = lfilter([1.0], np.concatenate([[1.0], -weights]), white, axis=0)[_BURN_IN:]
@@ -172,6 +145,5 @@ def score_covariance(slopes: Sequence[Array], noise: Sequence[Array], p: int) ->
     """
     total = np.zeros((p, p))
     for j, gamma in zip(slopes, noise, strict=True):
-        total += j.T @ matmul_toeplitz(gamma, j)
-    symmetric: Array = 0.5 * (total + total.T)
-    return symmetric
+        total += covariance_of_sums(j, gamma)
+    return total

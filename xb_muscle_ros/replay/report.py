@@ -11,33 +11,27 @@ import numpy as np
 
 from xb_muscle_ros.files import write_text
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.scores.rmsd import force_rmsd, windows
-from xb_muscle_ros.scores.stiffness import ratio, stiffness_of_phase
+from xb_muscle_ros.scores.estimate import MARK, MARK_NOTE, Estimate, error_text, mark, notes_of, quotient
+from xb_muscle_ros.scores.readout import ISOMETRIC, SRS_CONDITIONING, SRS_TEST, TEXT, read_off, read_off_measured
+from xb_muscle_ros.scores.rmsd import force_rmsd, short_windows, windows
 from xb_muscle_ros.trials.simulated import Simulated
-from xb_muscle_ros.trials.trial import Array, Trial
+from xb_muscle_ros.trials.trial import Trial
 
 Record = dict[str, Any]
-
-
-def _isometric_mean(trial: Trial, time_s: Array, force_f0: Array) -> float | None:
-    """Mean force of the isometric phase before anything else happens, F0."""
-    phase = trial.phases_by_name().get("isometric")
-    if phase is None or time_s.size == 0:
-        return None
-    inside = (time_s >= phase.start_s) & (time_s <= phase.end_s)
-    return float(np.mean(force_f0[inside])) if np.any(inside) else None
+# Keys of ``replay.json`` for what is read off a force.
+_NAMES = {SRS_CONDITIONING: "srs_conditioning", SRS_TEST: "srs_test", ISOMETRIC: "isometric_force_f0"}
 
 
 def record(trial: Trial, simulated: Simulated, fibre: Fibre) -> Record:
-    """One entry of ``replay.json``; forces in F0, stiffness in F0/L0, null where a phase or a measurement is absent."""
+    """One entry of ``replay.json``; forces in F0, stiffness in F0/L0, null where a phase or a measurement is absent.
+
+    Measured numbers have standard errors, ``..._se``; ``notes`` say why numbers are missing that could be expected.
+    """
     facts = trial.facts
-    time_s, length = trial.time_s, trial.length_change_l0
     force = simulated.force_n / facts.f0_n
     measured_s, measured = trial.force_time_s, trial.measured_f0
     has_measured = measured_s.size > 0
     at_measured = np.interp(measured_s, simulated.time_s, force) if has_measured else force[:0]
-    length_at_measured = np.interp(measured_s, time_s, length) if has_measured else length[:0]
-    phases = trial.phases_by_name()
     entry: Record = {
         "trial": facts.trial,
         "fibre": fibre.name,
@@ -51,16 +45,19 @@ def record(trial: Trial, simulated: Simulated, fibre: Fibre) -> Record:
             for name, window in windows(trial).items()
         },
     }
-    for key, name in (("conditioning", "conditioning_stretch"), ("test", "test_stretch")):
-        phase = phases.get(name)
-        entry[f"srs_{key}"] = stiffness_of_phase(simulated.time_s, length, force, phase)
-        entry[f"measured_srs_{key}"] = (
-            stiffness_of_phase(measured_s, length_at_measured, measured, phase) if has_measured else None
-        )
+    ours = read_off(trial, simulated.time_s, force)
+    theirs = read_off_measured(trial) if has_measured else dict.fromkeys(TEXT, Estimate(None))
+    for key, name in _NAMES.items():
+        entry[name] = ours[key].value
+        entry[f"measured_{name}"], entry[f"measured_{name}_se"] = theirs[key].value, theirs[key].se
     entry["relative_srs"] = None
-    entry["measured_relative_srs"] = None
-    entry["isometric_force_f0"] = _isometric_mean(trial, simulated.time_s, force)
-    entry["measured_isometric_force_f0"] = _isometric_mean(trial, measured_s, measured)
+    entry["measured_relative_srs"], entry["measured_relative_srs_se"] = None, None
+    entry["notes"] = [f"RMSD, {name}: {why}" for name, why in short_windows(trial).items() if has_measured]
+    for key, text in TEXT.items():
+        told = f"{text}, measured: {theirs[key].why}" if theirs[key].why else ""
+        if not told and ours[key].why:
+            told = f"{text}, simulated: {ours[key].why}"
+        entry["notes"] += [told] if told else []
     return entry
 
 
@@ -74,8 +71,19 @@ def add_relative_stiffness(records: Sequence[Record]) -> None:
             continue
         # A reference of the same recovery time first: it lay nearest in the order of the experiment.
         best = min(references, key=lambda r: abs((r["recovery_s"] or 0.0) - (entry["recovery_s"] or 0.0)))
-        entry["relative_srs"] = ratio(entry["srs_test"], best["srs_test"])
-        entry["measured_relative_srs"] = ratio(entry["measured_srs_test"], best["measured_srs_test"])
+        entry["relative_srs"] = quotient(Estimate(entry["srs_test"]), Estimate(best["srs_test"])).value
+        if entry is best:
+            # Its own error cancels.
+            entry["measured_relative_srs"] = None if entry["measured_srs_test"] is None else 1.0
+            continue
+        found = quotient(_measured_test(entry), _measured_test(best))
+        entry["measured_relative_srs"], entry["measured_relative_srs_se"] = found.value, found.se
+        if found.value is None and found.why and entry["measured_srs_test"] is not None:
+            entry["notes"].append(f"relative SRS, measured: {found.why}")
+
+
+def _measured_test(entry: Record) -> Estimate:
+    return Estimate(entry["measured_srs_test"], entry["measured_srs_test_se"])
 
 
 _COLUMNS = (
@@ -87,29 +95,21 @@ _COLUMNS = (
     ("rmsd_f0.conditioning", "cond.", "{:.2f}"),
     ("rmsd_f0.test", "test [% F0]", "{:.2f}"),
     ("srs_conditioning", "SRS cond.", "{:.1f}"),
-    ("measured_srs_conditioning", "meas.", "{:.1f}"),
+    ("measured_srs_conditioning", "meas. ± SE", "{:.1f}"),
     ("srs_test", "SRS test", "{:.1f}"),
-    ("measured_srs_test", "meas. [F0/L0]", "{:.1f}"),
+    ("measured_srs_test", "meas. ± SE [F0/L0]", "{:.1f}"),
     ("isometric_force_f0", "iso", "{:.3f}"),
-    ("measured_isometric_force_f0", "meas. [F0]", "{:.3f}"),
+    ("measured_isometric_force_f0", "meas. ± SE [F0]", "{:.3f}"),
 )
 _PERCENT = {"amplitude_l0", "rmsd_f0.whole", "rmsd_f0.conditioning", "rmsd_f0.test"}
 
 
 def table(records: Sequence[Record], title: str) -> str:
-    """Records as text in columns; a dash where there is nothing to say."""
-    rows = [[head for _, head, _ in _COLUMNS]]
-    for entry in records:
-        row = []
-        for key, _, form in _COLUMNS:
-            value: Any = entry
-            for part in key.split("."):
-                value = value[part]
-            if value is None:
-                row.append("–")
-            else:
-                row.append(form.format(100.0 * value if key in _PERCENT else value))
-        rows.append(row)
+    """Records as text in columns; a dash where there is nothing to say, and below it what dashes and marks mean."""
+    rows = [
+        [head for _, head, _ in _COLUMNS],
+        *([_cell(entry, key, form) for key, _, form in _COLUMNS] for entry in records),
+    ]
     widths = [max(len(row[i]) for row in rows) for i in range(len(_COLUMNS))]
     lines = [
         "  ".join(
@@ -117,7 +117,19 @@ def table(records: Sequence[Record], title: str) -> str:
         )
         for row in rows
     ]
-    return "\n".join([title, lines[0], "-" * len(lines[0]), *lines[1:]])
+    notes = [MARK_NOTE] if any(cell.endswith(MARK) for row in rows[1:] for cell in row[1:]) else []
+    notes += notes_of([(entry["trial"], line) for entry in records for line in entry.get("notes", ())])
+    return "\n".join([title, lines[0], "-" * len(lines[0]), *lines[1:], *notes])
+
+
+def _cell(entry: Record, key: str, form: str) -> str:
+    value: Any = entry
+    for part in key.split("."):
+        value = value[part]
+    if value is None:
+        return "–"
+    se = entry.get(f"{key}_se")
+    return form.format(100.0 * value if key in _PERCENT else value) + error_text(se) + mark(value if se else None, se)
 
 
 def write_json(path: Path, records: Sequence[Record], extra: Record | None = None) -> None:

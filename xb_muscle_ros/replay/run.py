@@ -118,13 +118,14 @@ def write_results(folder: Path, trials: Sequence[Trial], results: Replay, live: 
         results: of the replay.
         live: a second replay of the same trials, drawn on top.
     """
+    from xb_muscle_ros.figures.evaluate_look import label
     from xb_muscle_ros.figures.replay_figure import draw_replay
 
     remove_results(older_results(folder))
     facts = {"fibre": results.fibre.name, "model": results.fibre.model, "method": results.fibre.method}
     write_json(folder / "replay.json", results.records, {**facts, "live": results.live, "source": results.fibre.source})
-    label = f"{results.fibre.model} ({'live' if results.live else 'offline'})"
-    pages = draw_replay(folder / "replay.png", trials, results.simulated, label, live.simulated if live else None)
+    name = f"{label(results.fibre.model)} ({'live' if results.live else 'offline'})"
+    pages = draw_replay(folder / "replay.png", trials, results.simulated, name, live.simulated if live else None)
     for trial, simulated in zip(trials, results.simulated, strict=True):
         write_trial(_bag(folder, trial.facts.trial), trial, simulated)
     return [folder / "replay.json", *pages]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
+from xb_muscle_ros.scores.estimate import Estimate, Missing, quotient, rounded
+from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.trial import Array
 
 AFTER_S = 3.0
@@ -15,38 +18,65 @@ WINDOW_S = 0.1
 class Enhancement(NamedTuple):
     """Forces at one time after the end of the stretch.
 
+    Standard errors are those of the noise; what the muscle itself does otherwise from one trial to the next is not in
+    them. None for simulated forces.
+
     Attributes:
         stretched_f0, isometric_f0: forces of the two trials, means over the window, F0.
         enhancement_f0: their difference, F0.
-        relative: difference over the isometric force; None where that is zero.
+        relative: difference over the isometric force; None where that is not above its standard error.
+        enhancement_se_f0, relative_se: standard errors of these; None where not known.
     """
 
     stretched_f0: float
     isometric_f0: float
     enhancement_f0: float
     relative: float | None
+    enhancement_se_f0: float | None = None
+    relative_se: float | None = None
 
 
-def enhancement(
-    stretched_time_s: Array, stretched_f0: Array, isometric_time_s: Array, isometric_f0: Array, at_s: float
-) -> Enhancement | None:
+class Side(NamedTuple):
+    """One of the two trials that are compared.
+
+    Attributes:
+        time_s, force_f0: shape (n,), s and F0.
+        noise: of the force; None where it is simulated or its noise not known.
+    """
+
+    time_s: Array
+    force_f0: Array
+    noise: ForceNoise | None = None
+
+
+def enhancement(stretched: Side, isometric: Side, at_s: float) -> Enhancement | Missing:
     """Residual force enhancement (Herzog and Leonard 2002) at a time of both trials' clock.
 
     Args:
-        stretched_time_s, stretched_f0: trial that was stretched while active, shape (n,), s and F0.
-        isometric_time_s, isometric_f0: trial at the final length throughout, activated at the same time, shape (m,).
+        stretched: trial that was stretched while active.
+        isometric: trial at the final length throughout, activated at the same time.
         at_s: middle of the window of 0.1 s whose means are compared, s.
-
-    Returns:
-        None where a trial has no sample in the window.
     """
-    a = _mean_about(stretched_time_s, stretched_f0, at_s)
-    b = _mean_about(isometric_time_s, isometric_f0, at_s)
+    a, b = (_mean_about(side, at_s) for side in (stretched, isometric))
     if a is None or b is None:
+        which = "stretched" if a is None else "isometric"
+        return Missing(f"the {which} trial has no force within {0.5 * WINDOW_S:g} s of {at_s:.4g} s")
+    over = quotient(Estimate(*a), Estimate(*b))
+    difference = a.value - b.value
+    relative = None if over.value is None else difference / b.value
+    se = None if a.se is None or b.se is None else rounded(math.hypot(a.se, b.se))
+    # The relative enhancement is the quotient of the forces less one, with the same error.
+    return Enhancement(a.value, b.value, difference, relative, se, over.se)
+
+
+class _Mean(NamedTuple):
+    value: float
+    se: float | None
+
+
+def _mean_about(side: Side, at_s: float) -> _Mean | None:
+    inside = np.abs(side.time_s - at_s) <= 0.5 * WINDOW_S + 5e-10
+    if not np.any(inside):
         return None
-    return Enhancement(a, b, a - b, (a - b) / b if b else None)
-
-
-def _mean_about(time_s: Array, force: Array, at_s: float) -> float | None:
-    inside = np.abs(time_s - at_s) <= 0.5 * WINDOW_S + 5e-10
-    return float(np.mean(force[inside])) if np.any(inside) else None
+    se = None if side.noise is None else side.noise.of_mean(side.time_s[inside])
+    return _Mean(float(np.mean(side.force_f0[inside])), se)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import OptimizeWarning, curve_fit
 
+from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.trials.trial import Array
 
 _FEWEST = 5
@@ -42,20 +43,23 @@ def hill_curve(pca: Array, pca50: float, n_hill: float, passive_f0: float, maxim
     return curve
 
 
-def fit_force_pca(pca: Array, force_f0: Array) -> ForcePca | None:
+def fit_force_pca(pca: Array, force_f0: Array) -> ForcePca | Missing:
     """Fit Hill's equation.
 
     Args:
         pca, force_f0: shape (n,), one point for each pCa, force in F0; NaN is left out.
 
     Returns:
-        None for fewer than 5 levels of pCa, where force does not rise through half its range between them, or where
+        nothing for fewer than 5 levels of pCa, where force does not rise through half its range between them, or where
         no curve with a slope below 30 fits.
     """
     known = np.isfinite(pca) & np.isfinite(force_f0)
     x, y = np.asarray(pca)[known], np.asarray(force_f0)[known]
-    if np.unique(x).size < _FEWEST or np.ptp(y) == 0.0:
-        return None
+    levels = np.unique(x).size
+    if levels < _FEWEST:
+        return Missing(f"isometric force is known at {levels} levels of pCa; {_FEWEST} are needed")
+    if np.ptp(y) == 0.0:
+        return Missing("isometric force is the same at all pCa")
     half = 0.5 * (float(np.min(y)) + float(np.max(y)))
     above, below = x[y >= half], x[y < half]
     start = (0.5 * (float(np.max(above)) + float(np.min(below))), 4.0, float(np.min(y)), float(np.max(y)))
@@ -66,9 +70,12 @@ def fit_force_pca(pca: Array, force_f0: Array) -> ForcePca | None:
             hill_curve, x, y, p0=np.clip(start, lower, upper), bounds=(lower, upper), xtol=1e-12, ftol=1e-12
         )
     except (RuntimeError, ValueError, OptimizeWarning):
-        return None
+        return Missing("no curve could be fitted")
     if not 0.1 < found[1] < 0.999 * _STEEPEST or not np.min(x) < found[0] < np.max(x) or found[3] <= found[2]:
-        return None
+        return Missing(
+            f"the curve that fits best, pCa50 {found[0]:.3g} with a Hill coefficient of {found[1]:.3g}, lies beyond "
+            f"the levels of pCa or is as steep as {_STEEPEST:g}"
+        )
     errors = np.sqrt(np.diag(covariance))
     se = [float(e) if np.isfinite(e) and x.size > len(found) else None for e in errors[:2]]
     rmsd = float(np.sqrt(np.mean((hill_curve(x, *found) - y) ** 2)))

@@ -1,22 +1,23 @@
-"""Isometric force before anything happens to the fibre."""
+"""Isometric force before anything happens to the fibre: the one definition that all commands share."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from xb_muscle_ros.trials.phases import initial_isometric
-from xb_muscle_ros.trials.trial import Array, Phase
+from xb_muscle_ros.scores.estimate import Estimate
+from xb_muscle_ros.scores.standard_error import ForceNoise
+from xb_muscle_ros.scores.steady import steady_part
+from xb_muscle_ros.trials.trial import Array, Trial
 
 
-def isometric_force(time_s: Array, force_f0: Array, phases: tuple[Phase, ...]) -> float | None:
-    """Mean force (F0) of the isometric phase that begins a trial, without its last fifth.
+def isometric_force(trial: Trial, time_s: Array, force_f0: Array, noise: ForceNoise | None = None) -> Estimate:
+    """Mean force (F0) over the steady isometric part that a trial begins with.
 
     Args:
-        time_s, force_f0: shape (n,), s and F0.
-        phases: of the trial.
-
-    Returns:
-        None where the trial does not begin isometrically.
+        trial, time_s, force_f0: see `steady_part`.
+        noise: of the force; None for simulated force.
     """
-    held = force_f0[initial_isometric(time_s, phases)]
-    return float(np.mean(held)) if held.size else None
+    inside, why = steady_part(trial, time_s, force_f0)
+    if why:
+        return Estimate(None, why=why)
+    return Estimate(float(np.mean(force_f0[inside])), None if noise is None else noise.of_mean(time_s[inside]))

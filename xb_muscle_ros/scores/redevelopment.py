@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import curve_fit
 
+from xb_muscle_ros.scores.estimate import Missing, rounded
+from xb_muscle_ros.scores.noise.autocovariance import autocovariance, covariance_of_sums
+from xb_muscle_ros.scores.noise.hum import hum
+from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.trial import Array
 
 # A manoeuvre: this much shorter, for at most this long, and back to within this share of the step.
@@ -31,7 +36,7 @@ class Redevelopment(NamedTuple):
 
     Attributes:
         k_per_s: k_tr, 1/s.
-        se_per_s: its standard error, 1/s; widened for the correlation between successive residuals.
+        se_per_s: its standard error, 1/s, from the autocovariance of what the curve leaves of the force.
         start_f0, end_f0: force at the begin of the fit and where it tends to, F0.
         rmsd_f0: of the force from the curve, F0.
         from_s, to_s: what was fitted, in the clock of the samples, s.
@@ -81,40 +86,56 @@ def still_until(time_s: Array, length_l0: Array, restretched_s: float) -> float:
     return float(t[moved[0] - 1] if moved.size else t[-1])
 
 
-def redevelopment(time_s: Array, force_f0: Array, restretched_s: float, until_s: float) -> Redevelopment | None:
+def redevelopment(
+    time_s: Array, force_f0: Array, restretched_s: float, until_s: float, noise: ForceNoise | None = None
+) -> Redevelopment | Missing:
     """Fit one exponential to the force after the restretch.
 
     Args:
         time_s, force_f0: shape (n,), s and F0.
         restretched_s: end of the restretch, s.
         until_s: end of the isometric time after it, s.
+        noise: of the force in quiet times; the standard error is that which it gives, where that is the larger one:
+            a short record hides slow noise in the curve.
 
     Returns:
-        None where force does not fall by a tenth of its end below it, does not rise again, is followed for less than
-        0.2 s, or rises faster than 200 1/s.
+        nothing where force does not fall by a tenth of its end below it, does not rise again, is followed for less
+        than 0.2 s, or rises faster than 200 1/s.
     """
     after = (time_s >= restretched_s + _REST_S - 5e-10) & (time_s <= until_s + 5e-10)
     t, force = time_s[after], force_f0[after]
-    if t.size < 5 or t[-1] - t[0] < _SHORTEST_S:
-        return None
+    followed_s = float(t[-1] - t[0]) if t.size else 0.0
+    if t.size < 5 or followed_s < _SHORTEST_S:
+        return Missing(f"force is followed for {followed_s:.3g} s after the restretch; {_SHORTEST_S:g} s are needed")
     first = int(np.argmin(force[t <= t[0] + _LOWEST_WITHIN_S]))
     t, force = t[first:], force[first:]
     end = float(np.mean(force[t >= t[-1] - 0.1 * (t[-1] - t[0])]))
     if t.size < 5 or not end - force[0] > _SMALLEST_FALL * abs(end):
-        return None
+        return Missing("force does not fall by a tenth of its end, so that there is nothing to redevelop")
     since = t - t[0]
     half = float(since[int(np.argmax(force >= 0.5 * (force[0] + end)))])
     start = (np.log(2.0) / max(half, float(since[1])), float(force[0]), end)
     try:
         found, covariance = curve_fit(_rise, since, force, p0=start)
     except RuntimeError:
-        return None
-    residual = force - _rise(since, *found)
+        return Missing("no exponential could be fitted to the force after the restretch")
     if not 0.0 < found[0] < _FASTEST_PER_S or not np.all(np.isfinite(covariance)):
-        return None
+        return Missing(f"the exponential that fits best has a rate of {found[0]:.3g} 1/s; allowed is 0 to 200")
+    residual = force - _rise(since, *found)
+    # How the rate answers to the force at each sample.
+    weights = np.linalg.pinv(_slopes(since, *found))[0][:, None]
+    step_s = float(np.mean(np.diff(t)))
+    lines, rest = hum(step_s, residual)
+    gamma = autocovariance(rest, t.size)
+    for line in lines:
+        gamma = gamma + line.autocovariance(step_s * np.arange(t.size))
+    variance = float(covariance_of_sums(weights, gamma)[0, 0])
+    se = math.sqrt(max(variance, 0.0) * t.size / (t.size - 3))
+    if noise is not None:
+        se = max(se, noise.of_sum(weights[:, 0], t))
     return Redevelopment(
         k_per_s=float(found[0]),
-        se_per_s=float(np.sqrt(covariance[0, 0])) * _widening(residual),
+        se_per_s=rounded(se),
         start_f0=float(found[1]),
         end_f0=float(found[2]),
         rmsd_f0=float(np.sqrt(np.mean(residual**2))),
@@ -128,10 +149,7 @@ def _rise(since_s: Array, k: float, start: float, end: float) -> Array:
     return curve
 
 
-def _widening(residual: Array) -> float:
-    """Factor on a standard error that took residuals for independent: first-order autoregression in their place."""
-    scale = float(np.sum(residual**2))
-    if scale == 0.0:
-        return 1.0
-    rho = float(np.clip(np.sum(residual[1:] * residual[:-1]) / scale, 0.0, 0.9999))
-    return float(np.sqrt((1.0 + rho) / (1.0 - rho)))
+def _slopes(since_s: Array, k: float, start: float, end: float) -> Array:
+    """Of the curve against rate, begin and end, shape (n, 3)."""
+    fading = np.exp(-k * since_s)
+    return np.column_stack([(end - start) * since_s * fading, fading, 1.0 - fading])

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
+from xb_muscle_ros.scores.estimate import samples
 from xb_muscle_ros.trials.protocol import TEST_DURATION_S
 from xb_muscle_ros.trials.trial import Array, Trial
 
 # The paper's whole window reaches one test stretch's duration beyond the stretches on either side.
 MARGIN_S = TEST_DURATION_S
+# One or two samples happen to be near or far.
+FEWEST = 3
 
 
 def windows(trial: Trial) -> dict[str, tuple[float, float] | None]:
@@ -39,12 +43,27 @@ def force_rmsd(time_s: Array, simulated: Array, measured: Array, window: tuple[f
         window: start and end, s, both inclusive; None gives None.
 
     Returns:
-        None where no sample lies in the window.
+        None where fewer than 3 samples lie in the window.
     """
     if window is None:
         return None
-    # Half a nanosecond of grace: phases are computed, stamps are whole nanoseconds.
-    inside = (time_s >= window[0] - 5e-10) & (time_s <= window[1] + 5e-10)
-    if not np.any(inside):
+    inside = _inside(time_s, window)
+    if np.count_nonzero(inside) < FEWEST:
         return None
     return float(np.sqrt(np.mean((simulated[inside] - measured[inside]) ** 2)))
+
+
+def short_windows(trial: Trial) -> dict[str, str]:
+    """Why windows that a trial has leave no RMSD, in words, by name."""
+    counts = {
+        name: int(np.count_nonzero(_inside(trial.force_time_s, window)))
+        for name, window in windows(trial).items()
+        if window is not None
+    }
+    return {name: f"{samples(count)} in the window; 3 are needed" for name, count in counts.items() if count < FEWEST}
+
+
+def _inside(time_s: Array, window: tuple[float, float]) -> npt.NDArray[np.bool_]:
+    # Half a nanosecond of grace: phases are computed, stamps are whole nanoseconds.
+    inside: npt.NDArray[np.bool_] = (time_s >= window[0] - 5e-10) & (time_s <= window[1] + 5e-10)
+    return inside

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from xb_muscle_ros.diagnose.noise.windows import isometric_window
+from xb_muscle_ros.scores.noise.windows import isometric_window
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.trial import Phase, Trial
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import toeplitz
 
-from xb_muscle_ros.diagnose.noise.members import Memory, Regression
+from xb_muscle_ros.scores.noise.members import Memory, Regression
 
 Array = npt.NDArray[np.float64]
 

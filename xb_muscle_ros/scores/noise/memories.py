@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.noise.members import SILENCE, Memory
-from xb_muscle_ros.diagnose.noise.model import LEAST_SD_F0, Source, TrialNoise
-from xb_muscle_ros.diagnose.noise.posterior import share_of_others, spread_over
-from xb_muscle_ros.diagnose.noise.regressions import restricted
+from xb_muscle_ros.scores.noise.members import SILENCE, Memory
+from xb_muscle_ros.scores.noise.model import LEAST_SD_F0, Source, TrialNoise
+from xb_muscle_ros.scores.noise.posterior import share_of_others, spread_over
+from xb_muscle_ros.scores.noise.regressions import restricted
 
 Array = npt.NDArray[np.float64]
 

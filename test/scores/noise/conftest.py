@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,8 +10,10 @@ import numpy.typing as npt
 import pytest
 from scipy.signal import lfilter
 
-from xb_muscle_ros.diagnose.noise.windows import Window
 from xb_muscle_ros.replay.made import coloured_noise
+from xb_muscle_ros.scores.noise.model import NoiseModel
+from xb_muscle_ros.scores.noise.trials import by_windows
+from xb_muscle_ros.scores.noise.windows import Window
 from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
 
 Array = npt.NDArray[np.float64]
@@ -99,3 +101,13 @@ def made() -> SimpleNamespace:
     return SimpleNamespace(
         even_times=even_times, spreading_times=spreading_times, fading_noise=fading_noise, relaxing=relaxing
     )
+
+
+def _model_of(windows: Sequence[Window]) -> NoiseModel:
+    return NoiseModel(tuple(by_windows(windows).values()))
+
+
+@pytest.fixture(scope="session")
+def model_of() -> Callable[[Sequence[Window]], NoiseModel]:
+    """Makes the noise of a study of its windows."""
+    return _model_of

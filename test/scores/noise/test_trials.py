@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 
 from xb_muscle_ros.diagnose.cells import Residual
 from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.noise.model import NoiseModel, Source
-from xb_muscle_ros.diagnose.noise.trials import by_windows, completed, noise_of
-from xb_muscle_ros.diagnose.noise.windows import Window
 from xb_muscle_ros.diagnose.significance import significance
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.scores.noise.model import NoiseModel, Source
+from xb_muscle_ros.scores.noise.trials import by_windows, completed, noise_of
+from xb_muscle_ros.scores.noise.windows import Window
 from xb_muscle_ros.trials.trial import Trial
 
 Array = npt.NDArray[np.float64]

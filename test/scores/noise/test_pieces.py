@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from xb_muscle_ros.diagnose.noise.pieces import curves, evenly_sampled, smooth_pieces
+from xb_muscle_ros.scores.noise.pieces import curves, evenly_sampled, smooth_pieces
 from xb_muscle_ros.trials.trial import Trial
 
 Array = npt.NDArray[np.float64]

@@ -46,6 +46,14 @@ class Member(Protocol):
     def variance_of_mean(self, time_s: Array) -> float:
         """Of the mean over samples at some times, times their number, F0²."""
 
+    def at_lags(self, lags_s: Array, step_s: float) -> Array:
+        """Autocovariance, F0².
+
+        Args:
+            lags_s: shape (n,), from 0 on, s.
+            step_s: usual time between samples of the trial, s.
+        """
+
     def times(self, factor: float) -> Member:
         """The same, so much larger."""
 

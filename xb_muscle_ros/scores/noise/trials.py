@@ -9,13 +9,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtri
 
-from xb_muscle_ros.diagnose.noise.estimate import alike, by_regressions
-from xb_muscle_ros.diagnose.noise.memories import Timed, by_memories
-from xb_muscle_ros.diagnose.noise.model import MEMBERS, NoiseModel, Source, TrialNoise
-from xb_muscle_ros.diagnose.noise.pieces import Piece, curves, evenly_sampled, smooth_pieces
-from xb_muscle_ros.diagnose.noise.regressions import Part
-from xb_muscle_ros.diagnose.noise.windows import LEAST, Window, isometric_window
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.scores.noise.estimate import alike, by_regressions
+from xb_muscle_ros.scores.noise.memories import Timed, by_memories
+from xb_muscle_ros.scores.noise.model import MEMBERS, NoiseModel, Source, TrialNoise
+from xb_muscle_ros.scores.noise.pieces import Piece, curves, evenly_sampled, smooth_pieces
+from xb_muscle_ros.scores.noise.regressions import Part
+from xb_muscle_ros.scores.noise.windows import LEAST, Window, isometric_window
 from xb_muscle_ros.trials.trial import Trial
 
 Array = npt.NDArray[np.float64]

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
 
-from xb_muscle_ros.diagnose.noise.model import LEAST_SD_F0
-from xb_muscle_ros.fit.noise import extended
+from xb_muscle_ros.scores.noise.autocovariance import extended
+from xb_muscle_ros.scores.noise.model import LEAST_SD_F0
 
 Array = npt.NDArray[np.float64]
 
@@ -48,6 +48,13 @@ class Regression(NamedTuple):
     def autocovariance(self, lags: int) -> Array:
         """At lags 0 to `lags` - 1 samples, shape (lags,), F0²."""
         return extended(self.sd_f0**2 * self.colour, lags)
+
+    def at_lags(self, lags_s: Array, step_s: float) -> Array:
+        """See `model.Member`."""
+        lags = lags_s / step_s
+        gamma = self.autocovariance(int(np.ceil(lags[-1] - 1e-6)) + 1)
+        out: Array = np.interp(lags, np.arange(gamma.size), gamma)
+        return out
 
     def times(self, factor: float) -> Regression:
         """See `model.Member`."""
@@ -89,6 +96,11 @@ class Memory(NamedTuple):
             before = float(kept) * (before + 1.0)
             total += before
         return self.sd_f0**2 * (1.0 + 2.0 * self.share * total / time_s.size)
+
+    def at_lags(self, lags_s: Array, step_s: float) -> Array:
+        """See `model.Member`."""
+        fading: Array = self.share * np.exp(-lags_s / self.tau_s) + (1.0 - self.share) * (lags_s == 0.0)
+        return self.sd_f0**2 * fading
 
     def times(self, factor: float) -> Memory:
         """See `model.Member`."""

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.noise.windows import LEAST, MOST, same_calcium
+from xb_muscle_ros.scores.noise.windows import LEAST, MOST, same_calcium
 from xb_muscle_ros.trials.corners import SMALLEST_RAMP, SMALLEST_STRAIN
 from xb_muscle_ros.trials.trial import Phase, Trial
 

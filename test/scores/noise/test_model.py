@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from xb_muscle_ros.diagnose.noise.model import NoiseModel
-from xb_muscle_ros.diagnose.noise.windows import Window
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.fit.noise import sample_autocovariance
+from xb_muscle_ros.scores.noise.autocovariance import sample_autocovariance
+from xb_muscle_ros.scores.noise.model import NoiseModel
+from xb_muscle_ros.scores.noise.windows import Window
 
 Array = npt.NDArray[np.float64]
 Windows = Callable[..., list[Window]]

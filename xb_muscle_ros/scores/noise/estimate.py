@@ -11,10 +11,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.noise.members import SILENCE, Regression
-from xb_muscle_ros.diagnose.noise.model import LEAST_SD_F0, Source, TrialNoise
-from xb_muscle_ros.diagnose.noise.posterior import PRIOR_MEAN, most_probable, possible, share_of_others
-from xb_muscle_ros.diagnose.noise.regressions import Part, Regressions, correlation, regressions, squares
+from xb_muscle_ros.scores.noise.members import SILENCE, Regression
+from xb_muscle_ros.scores.noise.model import LEAST_SD_F0, Source, TrialNoise
+from xb_muscle_ros.scores.noise.posterior import most_probable, possible, prior_mean, share_of_others
+from xb_muscle_ros.scores.noise.regressions import ORDER, Part, Regressions, correlation, regressions, squares
 
 Array = npt.NDArray[np.float64]
 
@@ -30,7 +30,11 @@ def by_regressions(parts: Mapping[str, Sequence[Part]], source: Source) -> dict[
         source: what they are.
     """
     sounding = [p for own in parts.values() for p in own if not p.silent]
-    start = most_probable(sounding, [1.0] * len(sounding), PRIOR_MEAN) if len(sounding) > 1 else PRIOR_MEAN
+    if not sounding:
+        return {name: _of_trial(name, parts, np.zeros(ORDER), source) for name in parts}
+    start = prior_mean(sounding[0].step_s)
+    if len(sounding) > 1:
+        start = most_probable(sounding, [1.0] * len(sounding), start)
     return {name: _of_trial(name, parts, start, source) for name in parts}
 
 

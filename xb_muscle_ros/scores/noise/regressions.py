@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.noise.model import LEAST_SD_F0
+from xb_muscle_ros.scores.noise.model import LEAST_SD_F0
 
 Array = npt.NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.trials.phases import initial_isometric
+from xb_muscle_ros.scores.steady import steady_part
 from xb_muscle_ros.trials.trial import Trial
 
 Array = npt.NDArray[np.float64]
@@ -35,20 +35,19 @@ class Window(NamedTuple):
 
 
 def isometric_window(trial: Trial) -> Window:
-    """The measured force of a trial before its first length change, or where it has none, late in its longest pause.
+    """The steady force of a trial before its first length change, or where it has none, late in its longest pause.
 
     A pause is a recovery or hold, late its last third, by when what the length change did has mostly passed.
     """
     time_s = trial.force_time_s
-    inside = initial_isometric(time_s, trial.facts.phases)
+    inside, _ = steady_part(trial, time_s, trial.measured_f0)
     if inside.stop - inside.start < LEAST:
         pauses = [p for p in trial.facts.phases if p.name in ("isometric", "recovery", "hold")]
         longest = max(pauses, key=lambda p: p.end_s - p.start_s, default=None)
         if longest is not None:
             begin_s = longest.end_s - (longest.end_s - longest.start_s) / 3.0
             begin, end = np.searchsorted(time_s, [begin_s, longest.end_s])
-            inside = slice(int(begin), int(end))
-    inside = same_calcium(trial, inside)
+            inside = same_calcium(trial, slice(int(begin), int(end)))
     found = slice(max(inside.start, inside.stop - MOST), inside.stop)
     step_s = float(np.median(np.diff(time_s[found]))) if found.stop - found.start > 1 else math.nan
     return Window(trial.facts.trial, step_s, np.asarray(trial.measured_f0[found]))

@@ -7,15 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.noise.model import MEMBERS
-from xb_muscle_ros.diagnose.noise.regressions import ORDER, Part, regressions, squares
+from xb_muscle_ros.scores.noise.model import MEMBERS
+from xb_muscle_ros.scores.noise.regressions import ORDER, Part, regressions, squares
 
 Array = npt.NDArray[np.float64]
 
 # Partial correlations as inverse hyperbolic tangents: how far they go (0.995), and what to expect of force recordings
-# (rat soleus fibre 18Dec2017a has lag-1 correlations of 0.91 to 0.98, and hum). White noise overrules it in 50 samples.
+# (rat soleus fibre 18Dec2017a at 1 kHz has lag-1 correlations of 0.91 to 0.98, and hum: noise that fades within 18 ms,
+# and so the less from sample to sample the longer these are apart). White noise overrules it in 50 samples.
 _REACH, _PRIOR_SD = 3.0, 0.7
-PRIOR_MEAN = np.array([1.8] + [0.0] * (ORDER - 1))
+_PRIOR_TAU_S, _PRIOR_MOST = 0.0183, 2.5
 # Models that are tried for those from which draws come, and how much wider than a normal posterior they lie.
 _TRIED, _WIDER = 480, 1.5
 # Other trials' parts bear on a trial's colour as if they had this many samples together at most: colour at pCa 9 is not
@@ -23,6 +24,12 @@ _TRIED, _WIDER = 480, 1.5
 _OTHERS = 100
 # Newton steps at most; most studies take five.
 _STEPS = 25
+
+
+def prior_mean(step_s: float) -> Array:
+    """Partial correlations (inverse hyperbolic tangents) to expect of samples a step (s) apart, shape (order,)."""
+    first = np.arctanh(np.exp(-step_s / _PRIOR_TAU_S)) if step_s > 0.0 else _PRIOR_MOST
+    return np.array([min(float(first), _PRIOR_MOST)] + [0.0] * (ORDER - 1))
 
 
 def most_probable(parts: Sequence[Part], shares: Sequence[float], start: Array) -> Array:
@@ -86,7 +93,7 @@ def _costs(parts: Sequence[Part], shares: Sequence[float], z: Array) -> Array:
     """Minus the logarithm of the restricted likelihood of parts, each with its own size of noise, and of the prior.
 
     Args:
-        parts: of all trials.
+        parts: of all trials, the prior is that of the first one's sampling.
         shares: what each one's likelihood counts.
         z: partial correlations, inverse hyperbolic tangents, shape (many, order).
 
@@ -95,7 +102,9 @@ def _costs(parts: Sequence[Part], shares: Sequence[float], z: Array) -> Array:
     """
     left, log_determinants = squares(parts, regressions(z))
     of_parts = 0.5 * (np.array([p.freedom for p in parts]) * np.log(left) + log_determinants)
-    costs: Array = of_parts @ np.array(shares) + 0.5 * np.sum((z - PRIOR_MEAN) ** 2, axis=1) / _PRIOR_SD**2
+    costs: Array = (
+        of_parts @ np.array(shares) + 0.5 * np.sum((z - prior_mean(parts[0].step_s)) ** 2, axis=1) / _PRIOR_SD**2
+    )
     return costs
 
 

@@ -1,0 +1,44 @@
+"""What is read off the force of a trial, measured or simulated: one list for all commands."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from xb_muscle_ros.scores.estimate import Estimate
+from xb_muscle_ros.scores.isometric import isometric_force
+from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN, ForceNoise, force_noise
+from xb_muscle_ros.scores.stiffness import stiffness_of_phase
+from xb_muscle_ros.trials.trial import Array, Trial
+
+SRS_CONDITIONING, SRS_TEST, ISOMETRIC = "srs_conditioning", "srs_test", "isometric_f0"
+TEXT = {
+    SRS_CONDITIONING: "SRS of the conditioning stretch",
+    SRS_TEST: "SRS of the test stretch",
+    ISOMETRIC: "isometric force",
+}
+
+
+def read_off(trial: Trial, time_s: Array, force_f0: Array, noise: ForceNoise | None = None) -> dict[str, Estimate]:
+    """SRS (F0/L0) of both stretches and isometric force (F0) by the keys of `TEXT`.
+
+    Args:
+        trial: lengths, phases, calcium.
+        time_s, force_f0: shape (n,), s and F0.
+        noise: of the force; None for simulated force.
+    """
+    length = np.interp(time_s, trial.time_s, trial.length_change_l0)
+    phases = trial.phases_by_name()
+    return {
+        SRS_CONDITIONING: stiffness_of_phase(time_s, length, force_f0, phases.get("conditioning_stretch"), noise),
+        SRS_TEST: stiffness_of_phase(time_s, length, force_f0, phases.get("test_stretch"), noise),
+        ISOMETRIC: isometric_force(trial, time_s, force_f0, noise),
+    }
+
+
+def read_off_measured(trial: Trial) -> dict[str, Estimate]:
+    """The same of the measured force, with standard errors as far as its quiet times tell them."""
+    noise = force_noise(trial)
+    found = read_off(trial, trial.force_time_s, trial.measured_f0, noise)
+    if noise is not None:
+        return found
+    return {name: each if each.value is None else each._replace(why=NO_NOISE_KNOWN) for name, each in found.items()}

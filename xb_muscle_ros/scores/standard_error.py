@@ -1,0 +1,90 @@
+"""Standard errors of what is read off a measured force.
+
+Samples of force are not independent: hum of the mains and slow noise make neighbours resemble each other. The noise is
+taken from the trial's quiet times (`scores.noise`), and the variance of an estimate that is a weighted sum of samples
+from the autocovariance there, as Sum w_i w_j gamma(t_i - t_j). It allows for what stays unknown of the noise: gamma is
+the mean over the models of noise that the quiet times leave possible. Noise is taken to be the same all through the
+trial, and lengths and times to be without error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.scores.estimate import rounded
+from xb_muscle_ros.scores.noise.autocovariance import covariance_of_sums
+from xb_muscle_ros.scores.noise.hum import Line, hum
+from xb_muscle_ros.scores.noise.model import TrialNoise
+from xb_muscle_ros.scores.noise.pieces import evenly_sampled
+from xb_muscle_ros.scores.noise.trials import ENOUGH, by_windows, noise_of
+from xb_muscle_ros.scores.noise.windows import LEAST, isometric_window
+from xb_muscle_ros.trials.trial import Trial
+
+Array = npt.NDArray[np.float64]
+
+
+class ForceNoise:
+    """Noise of one trial's measured force."""
+
+    def __init__(self, noise: TrialNoise, step_s: float, lines: Sequence[Line] = ()) -> None:
+        """Noise as it is known.
+
+        Args:
+            noise: of the trial, hum of the mains aside.
+            step_s: usual time between its samples, s.
+            lines: the hum.
+        """
+        self._noise, self._step_s, self._lines = noise, step_s, tuple(lines)
+
+    def autocovariance(self, time_s: Array) -> Array:
+        """At lags of 0, 1, ... of the mean steps between these times, F0², shape (n,)."""
+        n = time_s.size
+        lags_s = np.arange(n) * (float(time_s[-1] - time_s[0]) / (n - 1) if n > 1 else self._step_s)
+        total: Array = np.mean([m.at_lags(lags_s, self._step_s) for m in self._noise.members], axis=0)
+        # The size of each model is an estimate of so many degrees of freedom.
+        total *= self._noise.freedom / max(self._noise.freedom - 2.0, 1.0)
+        for line in self._lines:
+            total += line.autocovariance(lags_s)
+        return total
+
+    def covariance(self, weights: Array, time_s: Array) -> Array:
+        """Covariance of weighted sums of samples, shape (sums, sums).
+
+        Args:
+            weights: shape (n, sums).
+            time_s: of the samples, shape (n,), s.
+        """
+        return covariance_of_sums(weights, self.autocovariance(time_s))
+
+    def of_sum(self, weights: Array, time_s: Array) -> float:
+        """Standard error of one weighted sum of samples, weights of shape (n,)."""
+        return rounded(float(np.sqrt(max(float(self.covariance(weights[:, None], time_s)[0, 0]), 0.0))))
+
+    def of_mean(self, time_s: Array) -> float:
+        """Standard error of the mean of samples at these times, F0."""
+        return self.of_sum(np.full(time_s.size, 1.0 / time_s.size), time_s)
+
+
+def force_noise(trial: Trial) -> ForceNoise | None:
+    """Noise of a trial's measured force; None where it never holds still, or moves steadily, for long enough."""
+    if trial.force_time_s.size < 2:
+        return None
+    name, step_s = trial.facts.trial, float(np.median(np.diff(trial.force_time_s)))
+    if evenly_sampled(trial):
+        window = isometric_window(trial)
+        if window.force_f0.size >= LEAST:
+            # In fewer samples a line is no sharper than an autoregression.
+            enough = window.force_f0.size >= ENOUGH
+            lines, rest = hum(window.step_s, window.force_f0) if enough else ((), window.force_f0)
+            return ForceNoise(by_windows([window._replace(force_f0=rest)])[name], step_s, lines)
+    try:
+        return ForceNoise(noise_of([trial]).trials[0], step_s)
+    except UserError:
+        return None
+
+
+NO_NOISE_KNOWN = "standard error not known: no quiet time to take the noise from"
