@@ -148,11 +148,14 @@ def test_a_flood_that_loses_messages_is_a_warning_with_the_count(start: Callable
 
     driver = start(mode="realtime", rate_hz=250.0)
     driver.send("calcium", 0.0, 5.0)
-    sender = driver._publisher("length")
+    sender, sample = driver._publisher("length"), message(0.0, 1.0)
+    # Numbers count from the first that comes.
+    end = time.monotonic() + PATIENCE_S
+    while driver.report(lambda r: True)["input age (s)"] == "none yet" and time.monotonic() < end:
+        sender.publish(sample)
     driver.link.wait_for(lambda: False, 0.5)
     driver.link.reset()
     count = 3000
-    sample = message(0.0, 1.0)
     for _ in range(count):
         sender.publish(sample)
     report = driver.report(lambda r: int(r["lost: length"]) > 0)
