@@ -16,6 +16,7 @@ from xb_muscle_ros.diagnose.names import MECHANISMS, Name, Verdict
 from xb_muscle_ros.diagnose.next_experiment import Proposal, propose
 from xb_muscle_ros.diagnose.noise.model import Source
 from xb_muscle_ros.diagnose.noise.trials import ENOUGH
+from xb_muscle_ros.diagnose.notes import notes, of_effort
 from xb_muscle_ros.diagnose.outcome import Outcome, write
 from xb_muscle_ros.diagnose.parsimony import kept_to_what_foretells
 from xb_muscle_ros.diagnose.plain import as_json
@@ -23,7 +24,7 @@ from xb_muscle_ros.diagnose.profile import known
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.screen import Linear
 from xb_muscle_ros.diagnose.search import QUICK, Effort, Search, Searcher, penalised
-from xb_muscle_ros.diagnose.significance import Significance
+from xb_muscle_ros.diagnose.significance import ALPHA, Significance
 from xb_muscle_ros.diagnose.study import Explanation, Study
 from xb_muscle_ros.diagnose.verdict import Decision, Evidence, decide, explained
 from xb_muscle_ros.errors import UserError
@@ -32,9 +33,6 @@ from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
 from xb_muscle_ros.trials.bags import find_bags, read_trial
 from xb_muscle_ros.trials.trial import Trial
 from xb_muscle_ros.work import Options
-
-# Below this chance the base is taken to miss something.
-_ALPHA = 0.01
 
 
 def diagnose_bags(
@@ -90,7 +88,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
         raise UserError(f"trials are of fibres {', '.join(fibres)}; diagnose one fibre at a time")
     warnings = [w for t in trials for w in t.warnings]
     # Released sets were fitted with smooth functions; what they blur is no physics to be looked for.
-    fibre = changed(fibre, {"smoothing": 0.0}, "diagnosis")
+    given, fibre = fibre, changed(fibre, {"smoothing": 0.0}, "diagnosis")
     study = Study(fibre, fit_trials(trials, [False] * len(trials), whole=True))
     recordings = Recordings.of(trials, effort.draws, seed)
     start = Fit(Explanation(), {}, np.inf, np.inf, 0)
@@ -99,13 +97,13 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
 
     def significant(of: Study, fit: Fit) -> bool:
         found = recordings.significance(of, Linear.of(of, fit))
-        return found.detected(_ALPHA)
+        return found.detected(ALPHA)
 
     searcher = Searcher(study, effort, options)
     search = searcher.search(significant)
     study = searcher.study
     before = recordings.significance(study, search.linear)
-    detected = before.detected(_ALPHA)
+    detected = before.detected(ALPHA)
     folds = folds_of(study, effort.folds)
 
     def scored(fits: Sequence[Fit]) -> dict[str, HeldOut]:
@@ -121,6 +119,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
     bound = recordings.bound(study, search.linear, last, folds) if folds and detected else None
     lead = _lead(search)
     interval = known(study, search.final, lead, effort.profiled, options) if lead and detected else None
+    described = _described(recordings, search, measured)
     decision = decide(
         Evidence(
             search=search,
@@ -133,10 +132,10 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
             interval=interval.interval if interval else None,
             at_bound=interval.at_bound if interval else False,
             cleaned=_cleaned(before, after),
-            described=_described(recordings, search, measured),
+            described=described,
         )
     )
-    return Outcome(
+    outcome = Outcome(
         trials=tuple(trials),
         study=study,
         search=search,
@@ -156,7 +155,10 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
         missing=tuple(_missing(recordings, search, folds, measured, decision)),
         seconds=time.monotonic() - begun,
         seed=seed,
+        described=described,
     )
+    lines = [*of_effort(effort, Effort(), len(trials)), *notes(given, trials, recordings, search, outcome.shown)]
+    return replace(outcome, notes=tuple(lines))
 
 
 def _to_score(search: Search, rivals: int) -> list[Fit]:
@@ -183,7 +185,7 @@ def _lead(search: Search) -> Name | None:
 
 def _cleaned(before: Significance, after: Significance) -> float:
     """Share of the located cells' mean square that is gone, beyond what noise leaves there."""
-    counted = before.counts(_ALPHA)
+    counted = before.counts(ALPHA)
     if not np.any(counted):
         counted = before.rms_f0 >= np.max(before.rms_f0)
     sizes = np.array([cell.end - cell.begin for cell in before.cells], dtype=np.float64)
