@@ -86,6 +86,12 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
     fibres = dict.fromkeys(t.facts.fibre for t in trials)
     if len(fibres) > 1:
         raise UserError(f"trials are of fibres {', '.join(fibres)}; diagnose one fibre at a time")
+    for trial in trials:
+        if trial.force_n.size and not np.any(trial.force_n):
+            raise UserError(
+                f"trial {trial.facts.trial}: measured force is 0 N in all {trial.force_n.size} samples; check the "
+                "force channel, or leave the bag out"
+            )
     warnings = [w for t in trials for w in t.warnings]
     # Released sets were fitted with smooth functions; what they blur is no physics to be looked for.
     given, fibre = fibre, changed(fibre, {"smoothing": 0.0}, "diagnosis")
@@ -236,7 +242,8 @@ def _missing(
         )
     if not folds:
         lines.append("at least three trials, so that some can be held out: without that no mechanism is named")
-    if decision.verdict is Verdict.UNEXPLAINED and not decision.checks and search.base.rmsd_f0 > 0.01:
+    told = sum(of_trial.samples for of_trial in recordings.noise.trials)
+    if decision.verdict is Verdict.UNEXPLAINED and not decision.checks and told < ENOUGH:
         lines.append(
             f"a longer time without movement in some trials: what is left, {100 * search.base.rmsd_f0:.1f} % F0, is "
             "not to be told from noise of which so few samples are known"
