@@ -217,6 +217,6 @@ def test_what_cannot_be_diagnosed_is_one_line(
         diagnose_bags([tmp_path / "bags"], FIBRE, tmp_path / "b")
     dead = replace(study(truth(), (6.0,))[0], force_n=np.zeros(PROTOCOL.trial(FIBRE, 6.0).time_s.size))
     write_trial(tmp_path / "dead" / "dead", dead)
-    with pytest.raises(UserError, match="force is 0 N in all .* samples; check the force channel"):
+    with pytest.raises(UserError, match=r"force is 0 N in all .* samples; check the force channel"):
         diagnose_bags([tmp_path / "dead"], FIBRE, tmp_path / "c")
     assert not (tmp_path / "c" / "diagnosis.json").exists()
