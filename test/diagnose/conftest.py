@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +19,9 @@ from xb_muscle_ros.scores.noise.model import NoiseModel
 from xb_muscle_ros.scores.noise.trials import by_windows
 from xb_muscle_ros.scores.noise.windows import Window
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
+
+# Made evidence that several test modules share.
+sys.path.insert(0, str(Path(__file__).parent))
 
 Array = npt.NDArray[np.float64]
 PCAS = (4.5, 5.8, 6.1, 6.3, 6.6)

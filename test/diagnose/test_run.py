@@ -144,6 +144,36 @@ def test_other_parameters_are_no_physics(tmp_path: Path) -> None:
     assert found["augmented_fiber"] is None
 
 
+def noise_free(model: str = "3state_coop", **values: float) -> list[Trial]:
+    """A study that the Gaussian form made, without noise: what differs is the parameters and what is concealed."""
+    fibre = truth(model, **values)
+    given = changed(load_fibre(FIBRE, model), {"smoothing": 0.0}, "test")
+    muscle = Muscle(replace(given, values=MappingProxyType({n: fibre.values[n] for n in given.values})))
+    random = np.random.default_rng(3)
+    return [made(muscle, PROTOCOL.trial(FIBRE, pca), random, 0.0) for pca in (4.5, 6.0, 6.2, 9.0)]
+
+
+def test_a_noise_free_study_of_the_model_itself_misses_nothing(tmp_path: Path) -> None:
+    """The Gaussian form made it: its error, which such recordings do not have, is not taken out of the model."""
+    found = diagnose_bags([write(tmp_path / "bags", noise_free())], FIBRE, tmp_path / "out", True, report=False)
+    assert found["verdict"] == "parameters"
+    assert found["answer"] == found["mismatch"] == []
+    assert found["confidence"] is None
+    assert found["before"]["train_rmsd_f0"] < 1e-3
+    assert not any("Gaussian form" in line for line in found["notes"])
+    assert "unlikely" not in found["summary"]
+    assert all(f"Note: {line}." in found["summary"] for line in found["notes"])
+
+
+def test_a_noise_free_study_names_what_was_put_in_and_nothing_else(tmp_path: Path) -> None:
+    trials = noise_free("3state_coop+viscous_drag", drag=0.04)
+    found = diagnose_bags([write(tmp_path / "bags", trials)], FIBRE, tmp_path / "out", True, report=False)
+    assert found["verdict"] == "physics"
+    assert found["answer"] == ["viscous_drag"]
+    assert found["heldout_gain"]["better"]
+    assert found["after"]["heldout_rmsd_f0"] < 0.2 * found["before"]["heldout_rmsd_f0"]
+
+
 def random_force(trials: list[Trial]) -> list[Trial]:
     random = np.random.default_rng(0)
     return [replace(t, force_n=random.normal(0.5, 0.2, t.force_n.size)) for t in trials]
@@ -189,3 +219,8 @@ def test_what_cannot_be_diagnosed_is_one_line(
     write_trial(tmp_path / "bags" / "silent", silent)
     with pytest.raises(UserError, match="has no measured force"):
         diagnose_bags([tmp_path / "bags"], FIBRE, tmp_path / "b")
+    dead = replace(study(truth(), (6.0,))[0], force_n=np.zeros(PROTOCOL.trial(FIBRE, 6.0).time_s.size))
+    write_trial(tmp_path / "dead" / "dead", dead)
+    with pytest.raises(UserError, match=r"force is 0 N in all .* samples; check the force channel"):
+        diagnose_bags([tmp_path / "dead"], FIBRE, tmp_path / "c")
+    assert not (tmp_path / "c" / "diagnosis.json").exists()

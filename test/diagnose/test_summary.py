@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from xb_muscle_ros.diagnose.claims import together
 from xb_muscle_ros.diagnose.names import FAMILY, Name, Verdict
-from xb_muscle_ros.diagnose.sentences import located, together
+from xb_muscle_ros.diagnose.sentences import located
 from xb_muscle_ros.diagnose.summary import summary_pieces, summary_text
 from xb_muscle_ros.diagnose.words import chance, digits, family_words, human, likely, meaning, percent
 from xb_muscle_ros.diagnose.written import filled
@@ -57,7 +58,7 @@ def diagnosis(verdict: str, **changes: Any) -> dict[str, Any]:
         "candidates": [
             {
                 "name": "viscous_drag", "kind": "mechanism", "parameters": {"drag": 0.012},
-                "interval": {"drag": [0.011, 0.013]},
+                "interval": {"drag": [0.011, 0.013]}, "train_rmsd_f0": 0.0038,
             },
             {"name": "base", "kind": "base"},
         ],
@@ -108,9 +109,9 @@ def test_noise_says_where_it_comes_from() -> None:
         ),
         ("parameters", "f from 80.0 to 95.0 1/s."),
         ("measurement", "no physics but the measurement: length gain"),
-        ("ambiguous", "Two explanations do about equally well: viscous drag and passive viscoelasticity."),
+        ("ambiguous", "One explanation does best, viscous drag, but passive viscoelasticity cannot be ruled out."),
         ("ambiguous", "one family, parallel viscoelasticity"),
-        ("unexplained", "The only explanation tried does not remove it."),
+        ("unexplained", "The only explanation fitted does not remove it."),
         ("unexplained", "time constant of 30.0 ms; it scales with the activation of the thin filament"),
         ("something new", "No explanation removes it."),
     ],

@@ -57,6 +57,8 @@ class Outcome:
         proposal: the next experiment.
         start_forces: recorded force by the fibre file as given, by trial.
         warnings, missing: a line each.
+        described: whether the recordings could be judged.
+        notes: what was assumed, left out or not looked at, a line each.
         seconds: that it took.
         seed: of the bootstrap.
     """
@@ -80,6 +82,8 @@ class Outcome:
     missing: tuple[str, ...]
     seconds: float
     seed: int
+    described: bool = True
+    notes: tuple[str, ...] = ()
 
     @property
     def shown(self) -> Fit:

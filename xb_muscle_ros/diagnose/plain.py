@@ -15,6 +15,7 @@ from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
 from xb_muscle_ros.diagnose.outcome import AUGMENTED, NEXT, Outcome
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.search import penalised
+from xb_muscle_ros.diagnose.significance import ALPHA
 from xb_muscle_ros.diagnose.summary import summary_text
 from xb_muscle_ros.measurement.faults import FAULTS
 from xb_muscle_ros.models.parameters import PARAMETERS
@@ -39,10 +40,11 @@ def as_json(o: Outcome, quick: bool) -> dict[str, Any]:
         "family": d.family,
         "p_value": o.before.overall_p,
         "confidence": d.confidence,
+        "described": o.described,
         "trials": _trials(o),
-        "mismatch": o.before.mismatch(0.01) or _whole_mismatch(o),
-        "map": o.before.map(),
-        "map_after": (o.before if o.shown is o.search.base else o.after).map(),
+        "mismatch": o.before.mismatch(ALPHA) or _whole_mismatch(o),
+        "map": o.before.map(ALPHA),
+        "map_after": (o.before if o.shown is o.search.base else o.after).map(ALPHA),
         "conflicts": [c._asdict() for c in o.conflicts],
         "kernel": _kernel(o.law),
         "nuisances": _nuisances(o),
@@ -61,6 +63,7 @@ def as_json(o: Outcome, quick: bool) -> dict[str, Any]:
         },
         "before": _scores(o, o.search.base),
         "after": _scores(o, o.shown),
+        "heldout_gain": None if d.gain is None else d.gain.to_json(o.search.final.explanation.label),
         "start": {"train_rmsd_f0": rmsd([t.measured_f0 for t in o.study.trials], o.start_forces)},
         "flexible_bound_rmsd_f0": o.bound.flexible_f0 if o.bound else None,
         "linear_heldout": {"before_rmsd_f0": o.bound.before_f0, "after_rmsd_f0": o.bound.after_f0} if o.bound else None,
@@ -76,6 +79,7 @@ def as_json(o: Outcome, quick: bool) -> dict[str, Any]:
         "augmented_fiber": AUGMENTED if o.augmented else None,
         "missing": list(o.missing),
         "warnings": list(o.warnings),
+        "notes": list(o.notes),
         "how": dict(HOW),
     }
     found["summary"] = summary_text(found)
@@ -84,7 +88,7 @@ def as_json(o: Outcome, quick: bool) -> dict[str, Any]:
 
 def _whole_mismatch(o: Outcome) -> list[dict[str, Any]]:
     """Where the whole stands out but no cell does: the largest cell, with the p-value of the whole."""
-    if not o.before.detected(0.01):
+    if not o.before.detected(ALPHA):
         return []
     i = int(np.argmax(o.before.rms_f0))
     cell = o.before.cells[i]

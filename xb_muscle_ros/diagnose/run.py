@@ -14,6 +14,7 @@ from xb_muscle_ros.diagnose.crossval import HeldOut, folds_of, held_out
 from xb_muscle_ros.diagnose.mismatch import Recordings, rmsd, simulated
 from xb_muscle_ros.diagnose.names import MECHANISMS, Name, Verdict
 from xb_muscle_ros.diagnose.next_experiment import Proposal, propose
+from xb_muscle_ros.diagnose.notes import notes, of_effort
 from xb_muscle_ros.diagnose.outcome import Outcome, write
 from xb_muscle_ros.diagnose.parsimony import kept_to_what_foretells
 from xb_muscle_ros.diagnose.plain import as_json
@@ -21,7 +22,7 @@ from xb_muscle_ros.diagnose.profile import known
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.screen import Linear
 from xb_muscle_ros.diagnose.search import QUICK, Effort, Search, Searcher, penalised
-from xb_muscle_ros.diagnose.significance import Significance
+from xb_muscle_ros.diagnose.significance import ALPHA, Significance
 from xb_muscle_ros.diagnose.study import Explanation, Study
 from xb_muscle_ros.diagnose.verdict import Decision, Evidence, decide, explained
 from xb_muscle_ros.errors import UserError
@@ -34,9 +35,6 @@ from xb_muscle_ros.trials.completing import Known
 from xb_muscle_ros.trials.study import read_study
 from xb_muscle_ros.trials.trial import Trial
 from xb_muscle_ros.work import Options
-
-# Below this chance the base is taken to miss something.
-_ALPHA = 0.01
 
 
 def diagnose_bags(
@@ -75,11 +73,11 @@ def diagnose_bags(
     if not bags:
         raise UserError("there are no bags to diagnose; give at least one")
     fibre = load_fibre(fiber, model, method)
-    trials, notes = read_study(bags, fibre.name, (known or Known()).of_file(fibre), only)
+    trials, told = read_study(bags, fibre.name, (known or Known()).of_file(fibre), only)
     options = options or Options(processes=0, quiet=True)
     options = replace(options, journal=options.journal or out / "journal.jsonl")
     outcome = diagnose(trials, fibre, QUICK if quick else Effort(), seed, options)
-    outcome = replace(outcome, warnings=(*notes, *outcome.warnings))
+    outcome = replace(outcome, warnings=(*told, *outcome.warnings))
     found = as_json(outcome, quick)
     write(out, outcome, found, report)
     return found
@@ -95,9 +93,15 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
     fibres = dict.fromkeys(t.facts.fibre for t in trials)
     if len(fibres) > 1:
         raise UserError(f"trials are of fibres {', '.join(fibres)}; diagnose one fibre at a time")
+    for trial in trials:
+        if trial.force_n.size and not np.any(trial.force_n):
+            raise UserError(
+                f"trial {trial.facts.trial}: measured force is 0 N in all {trial.force_n.size} samples; check the "
+                "force channel, or leave the bag out"
+            )
     warnings = [w for t in trials for w in t.warnings]
     # Released sets were fitted with smooth functions; what they blur is no physics to be looked for.
-    fibre = changed(fibre, {"smoothing": 0.0}, "diagnosis")
+    given, fibre = fibre, changed(fibre, {"smoothing": 0.0}, "diagnosis")
     # What is written carries the rest length and F0 of what was measured.
     fibre, differing = with_constants(fibre, [t.facts for t in trials])
     warnings += differing
@@ -109,13 +113,13 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
 
     def significant(of: Study, fit: Fit) -> bool:
         found = recordings.significance(of, Linear.of(of, fit))
-        return found.detected(_ALPHA)
+        return found.detected(ALPHA)
 
     searcher = Searcher(study, effort, options)
     search = searcher.search(significant)
     study = searcher.study
     before = recordings.significance(study, search.linear)
-    detected = before.detected(_ALPHA)
+    detected = before.detected(ALPHA)
     folds = folds_of(study, effort.folds)
 
     def scored(fits: Sequence[Fit]) -> dict[str, HeldOut]:
@@ -131,6 +135,7 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
     bound = recordings.bound(study, search.linear, last, folds) if folds and detected else None
     lead = _lead(search)
     interval = known(study, search.final, lead, effort.profiled, options) if lead and detected else None
+    described = _described(recordings, search, measured)
     decision = decide(
         Evidence(
             search=search,
@@ -143,10 +148,10 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
             interval=interval.interval if interval else None,
             at_bound=interval.at_bound if interval else False,
             cleaned=_cleaned(before, after),
-            described=_described(recordings, search, measured),
+            described=described,
         )
     )
-    return Outcome(
+    outcome = Outcome(
         trials=tuple(trials),
         study=study,
         search=search,
@@ -166,7 +171,10 @@ def diagnose(trials: Sequence[Trial], fibre: Fibre, effort: Effort, seed: int, o
         missing=tuple(_missing(recordings, search, folds, measured, decision)),
         seconds=time.monotonic() - begun,
         seed=seed,
+        described=described,
     )
+    lines = [*of_effort(effort, Effort(), len(trials)), *notes(given, trials, recordings, search, outcome.shown)]
+    return replace(outcome, notes=tuple(lines))
 
 
 def _to_score(search: Search, rivals: int) -> list[Fit]:
@@ -193,7 +201,7 @@ def _lead(search: Search) -> Name | None:
 
 def _cleaned(before: Significance, after: Significance) -> float:
     """Share of the located cells' mean square that is gone, beyond what noise leaves there."""
-    counted = before.counts(_ALPHA)
+    counted = before.counts(ALPHA)
     if not np.any(counted):
         counted = before.rms_f0 >= np.max(before.rms_f0)
     sizes = np.array([cell.end - cell.begin for cell in before.cells], dtype=np.float64)
@@ -244,7 +252,8 @@ def _missing(
         )
     if not folds:
         lines.append("at least three trials, so that some can be held out: without that no mechanism is named")
-    if decision.verdict is Verdict.UNEXPLAINED and not decision.checks and search.base.rmsd_f0 > 0.01:
+    told = sum(of_trial.samples for of_trial in recordings.noise.trials)
+    if decision.verdict is Verdict.UNEXPLAINED and not decision.checks and told < ENOUGH:
         lines.append(
             f"a longer time without movement in some trials: what is left, {100 * search.base.rmsd_f0:.1f} % F0, is "
             "not to be told from noise of which so few samples are known"

@@ -71,6 +71,7 @@ class Search:
         fits: every explanation that was fitted, by label.
         screened: candidates at the base, the most promising first.
         linear: the base, taken as linear.
+        unsolved: labels of explanations for which the model had no solution.
     """
 
     study: Study
@@ -79,6 +80,7 @@ class Search:
     screened: Sequence[Screened]
     linear: Linear
     fits: dict[str, Fit] = field(default_factory=dict)
+    unsolved: list[str] = field(default_factory=list)
 
     def rivals(self, name: Name) -> list[Fit]:
         """Fits with something else in the place of one name of the final explanation, the best first."""
@@ -105,6 +107,7 @@ class Searcher:
     def __init__(self, study: Study, effort: Effort, options: Options) -> None:
         self.study, self.effort, self.options = study, effort, options
         self.fits: dict[str, Fit] = {}
+        self.unsolved: list[str] = []
         self._compiled: set[str] = set()
 
     def _tasks(self, wanted: Sequence[tuple[Explanation, Sequence[Mapping[str, float]]]]) -> list[dict[str, Any]]:
@@ -124,9 +127,12 @@ class Searcher:
 
     def fitted(self, wanted: Sequence[tuple[Explanation, Sequence[dict[str, float]]]], label: str) -> list[Fit]:
         """Fits of explanations, each from its starts; those without a solution are left out."""
-        tasks = self._tasks([(e, starts) for e, starts in wanted if e.label not in self.fits])
-        for row in run(refit_task, tasks, replace(self.options, label=label)):
-            if row is not None:
+        missing = [(e, starts) for e, starts in wanted if e.label not in self.fits]
+        rows = run(refit_task, self._tasks(missing), replace(self.options, label=label))
+        for (explanation, _), row in zip(missing, rows, strict=True):
+            if row is None:
+                self.unsolved.append(explanation.label)
+            else:
                 fit = fit_of(row)
                 self.fits[fit.explanation.label] = fit
         return [self.fits[e.label] for e, _ in wanted if e.label in self.fits]
@@ -154,8 +160,10 @@ class Searcher:
                 found[fit.explanation.label] = self.fits[fit.explanation.label] = fit
         return list(found.values())
 
-    def base(self) -> Fit:
-        """Parameters alone, with the closure's error of where they end taken out.
+    def base(self, significant: Callable[[Study, Fit], bool]) -> Fit:
+        """Parameters alone, with the closure's error of where they end taken out where they leave more than noise.
+
+        A recording that the Gaussian form reproduces (one that it made, say) shows none of that error.
 
         Raises:
             UserError: the model has no solution at the fibre's own values.
@@ -167,6 +175,8 @@ class Searcher:
                 f"fibre {self.study.fibre.name}, model {self.study.fibre.model}: no solution at the values of the "
                 "fibre file; start from another one"
             )
+        if not self.effort.closure or not significant(self.study, found[0]):
+            return found[0]
         for _ in range(self.effort.closure):
             self.study = replace(self.study, closure_f0=closure_error(self.study, found[0]))
             self.fits.clear()
@@ -179,10 +189,10 @@ class Searcher:
         Args:
             significant: whether more than noise is left of a fit.
         """
-        base = final = self.base()
+        base = final = self.base(significant)
         linear = Linear.of(self.study, base)
         screened = self._screened(base, linear)
-        found = Search(self.study, base, final, screened, linear, self.fits)
+        found = Search(self.study, base, final, screened, linear, self.fits, self.unsolved)
         candidates: Sequence[Screened] = screened
         for step in range(self.effort.steps):
             if not significant(self.study, final):
@@ -194,7 +204,27 @@ class Searcher:
                 break
             final = better
         found.final = self._pruned(final)
+        if self._does_without_closure(found.final, significant):
+            self.study, self.effort = replace(self.study, closure_f0={}), replace(self.effort, closure=0)
+            self.fits = {}
+            return self.search(significant)
         return found
+
+    def _does_without_closure(self, final: Fit, significant: Callable[[Study, Fit], bool]) -> bool:
+        """Whether the Gaussian form with what was named reproduces the recordings, and better so as it is.
+
+        What was taken out of it is then an error that the recordings do not have, and part of what was named may only
+        put it back.
+        """
+        if not self.study.closure_f0 or not final.explanation.names:
+            return False
+        study = replace(self.study, closure_f0={})
+        task = {**self._tasks([(final.explanation, [final.values])])[0], "study": study.to_json()}
+        (row,) = run(refit_task, [task], replace(self.options, label="closure"))
+        if row is None:
+            return False
+        plain = fit_of(row)
+        return plain.cost < final.cost and not significant(study, plain)
 
     def _screened(self, fit: Fit, linear: Linear) -> list[Screened]:
         """Candidates beside a fit, their models compiled side by side first: one takes seconds, and they are many."""

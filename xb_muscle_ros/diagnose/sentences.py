@@ -2,24 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
-from xb_muscle_ros.diagnose.words import (
-    SCALES,
-    chance,
-    family_of,
-    human,
-    joined,
-    likely,
-    meaning,
-    parts,
-    percent,
-    phase_words,
-    quantity,
-)
-
-Facts = Mapping[str, Any]
+from xb_muscle_ros.diagnose.claims import Facts, Piece, Sentence, error_of
+from xb_muscle_ros.diagnose.words import SCALES, human, joined, meaning, parts, percent, phase_words, quantity
 
 _MOST_CHANGES = 3
 # Parameters that moved less than this share are not worth a word.
@@ -29,18 +16,6 @@ LAW = 0.2
 # Where the mean is less than this share of the root mean square, a residual goes both ways.
 ONE_WAY = 0.5
 _PULLS = {1: "harder than the model", -1: "less than the model", 0: "now harder, now less than the model"}
-
-
-class Piece(NamedTuple):
-    """A piece of a sentence.
-
-    Attributes:
-        text: as it reads.
-        how: where it is a number, the entry of ``how`` that tells how it was computed.
-    """
-
-    text: str
-    how: str | None = None
 
 
 class Located(NamedTuple):
@@ -59,21 +34,6 @@ class Located(NamedTuple):
     size_f0: float
     rows: tuple[Facts, ...]
     others: tuple[str, ...]
-
-
-Sentence = list[Piece]
-
-
-def together(facts: Facts) -> bool:
-    """Whether several names in the answer act together, rather than being rivals that cannot be told apart."""
-    answer = facts["answer"]
-    if facts["verdict"] == "ambiguous" or len(answer) < 2:
-        return False
-    best = next((row for row in facts["candidates"] if row["name"] != "base"), None)
-    if best is not None and best["kind"] == "pair":
-        return set(parts(str(best["name"]))) == set(answer)
-    families = {family_of(str(name)) for name in answer}
-    return not (facts["family"] and families == {facts["family"]})
 
 
 def located(facts: Facts) -> Located | None:
@@ -107,20 +67,20 @@ def answer_names(facts: Facts) -> list[str]:
     return [str(name) for name in facts["answer"]]
 
 
-def _error(facts: Facts, which: str) -> tuple[float | None, str]:
-    """Error on trials left out of the fit, or on those fitted where there were none left out."""
-    group = facts[which]
-    if group["heldout_rmsd_f0"] is not None:
-        return group["heldout_rmsd_f0"], "heldout_rmsd"
-    return group["train_rmsd_f0"], "rmsd"
-
-
 def how_well(facts: Facts, does: str) -> list[Sentence]:
-    """How closely the base model follows the recordings."""
-    error, how = _error(facts, "before")
+    """How closely the base model follows the recordings that it was fitted to, and those that it was not."""
+    error, how = facts["before"]["train_rmsd_f0"], "rmsd"
+    if error is None:
+        error, how = error_of(facts, "before")
     if error is None:
         return [[Piece(f"The model {does} {fibre_words(facts)}.")]]
     sentence = [Piece(f"The model {does} {fibre_words(facts)} to within "), Piece(f"{percent(error)} % F0", how)]
+    left_out = facts["before"]["heldout_rmsd_f0"]
+    if left_out is not None and how == "rmsd":
+        sentence += [
+            Piece(", and trials left out of the fit to within "),
+            Piece(f"{percent(left_out)} % F0", "heldout_rmsd"),
+        ]
     return [[*sentence, *_noise(facts), Piece(".")]]
 
 
@@ -142,7 +102,7 @@ def difference(facts: Facts) -> list[Sentence]:
     """How large the difference is, and where."""
     error, how = facts["before"]["train_rmsd_f0"], "rmsd"
     if error is None:
-        error, how = _error(facts, "before")
+        error, how = error_of(facts, "before")
     out: list[Sentence] = [[Piece(f"The model differs from the recordings of {fibre_words(facts)}.")]]
     if error is not None:
         out = [[
@@ -199,53 +159,6 @@ def parameter_value(facts: Facts) -> Sentence:
         out += [Piece(", with 95 % certainty between "), Piece(f"{quantity(interval[0], None)}", "interval")]
         out += [Piece(" and "), Piece(f"{quantity(interval[1], unit)}", "interval")]
     return [*out, Piece(".")]
-
-
-def gain(facts: Facts, when: str) -> list[Sentence]:
-    """What the answer does to the error, beside what a flexible curve does."""
-    (before, how), (after, how_after) = _error(facts, "before"), _error(facts, "after")
-    if before is None or after is None or how != how_after:
-        return []
-    trials = "trials left out of the fit" if how == "heldout_rmsd" else "the trials fitted"
-    moves = "falls" if after < before else "rises"
-    out = [
-        Piece(f"{when}, the error on {trials} {moves} from "),
-        Piece(percent(before), how),
-        Piece(" to "),
-        Piece(f"{percent(after)} % F0", how),
-    ]
-    bound = facts["flexible_bound_rmsd_f0"]
-    # A curve that learns nothing for other trials is no yardstick.
-    if bound is not None and how == "heldout_rmsd" and bound < before:
-        out += [
-            Piece(". A flexible curve without any physics gets to "),
-            Piece(f"{percent(bound)} % F0", "flexible_bound"),
-        ]
-    return [[*out, Piece(".")]]
-
-
-def sureness(facts: Facts) -> list[Sentence]:
-    """How likely the answer is the right one."""
-    share = facts["confidence"]
-    if share is None:
-        return []
-    return [
-        [
-            Piece(f"That this is the right explanation among those tried is {likely(share)} ("),
-            Piece(f"{100.0 * share:.0f} %", "confidence"),
-            Piece(")."),
-        ]
-    ]
-
-
-def by_chance(facts: Facts, what: str) -> list[Sentence]:
-    """How often chance does as much."""
-    p_value = facts["p_value"]
-    if p_value is None:
-        return []
-    if facts["verdict"] in ("none", "parameters"):
-        return [[Piece(f"{what}: chance alone leaves as much "), Piece(chance(p_value), "p_value"), Piece(".")]]
-    return [[Piece(f"{what} comes about by chance "), Piece(chance(p_value), "p_value"), Piece(".")]]
 
 
 def changes(facts: Facts) -> list[Sentence]:
@@ -312,6 +225,6 @@ def what_helps(facts: Facts) -> list[Sentence]:
     return [[Piece(f"What would tell more: {str(facts['missing'][0]).strip().rstrip('.')}.")]]
 
 
-def well_below(value: float, reference: float | None) -> bool:
-    """Whether an error is lower by a tenth at least."""
-    return reference is not None and value < 0.9 * reference
+def notes(facts: Facts) -> list[Sentence]:
+    """What was left out, assumed or not looked at, a sentence each."""
+    return [[Piece(f"Note: {str(line).strip().rstrip('.')}.")] for line in facts["notes"]]

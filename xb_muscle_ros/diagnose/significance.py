@@ -28,6 +28,8 @@ Array = npt.NDArray[np.float64]
 # larger as the root of the time: a few milliseconds at the end of a fast ramp are the steps' and the sampling's.
 FLOOR_F0, _FLOOR_S = 0.003, 0.1
 _SIGMAS = 3.0
+ALPHA = 0.01
+"""Below this chance a difference is taken for one."""
 # Numbers held at a time.
 _AT_ONCE = 3_000_000
 _LEAST_F0 = 1e-12
@@ -107,8 +109,8 @@ class Significance:
         inside = (r.time_s >= phase.start_s) & (r.time_s <= phase.end_s)
         return phase.name, float(np.sqrt(np.mean(r.value_f0[inside] ** 2)))
 
-    def map(self) -> dict[str, Any]:
-        """Trials by phases, as plain data; None where a trial lacks a phase."""
+    def map(self, alpha: float = ALPHA) -> dict[str, Any]:
+        """Trials by phases, as plain data; None where a trial lacks a phase; `counts` as in `counts`."""
         trials, phases = [r.trial for r in self.residuals], phase_names(self.cells)
         out: dict[str, Any] = {"trials": trials, "phases": phases}
         for name, values in (("rms_f0", self.rms_f0), ("mean_f0", self.mean_f0), ("p_value", self.p_value)):
@@ -116,7 +118,10 @@ class Significance:
             for cell, value in zip(self.cells, values, strict=True):
                 rows[trials.index(cell.trial)][phases.index(cell.phase)] = float(value)
             out[name] = rows
-        return out
+        counted = [[False] * len(phases) for _ in trials]
+        for cell, counts in zip(self.cells, self.counts(alpha), strict=True):
+            counted[trials.index(cell.trial)][phases.index(cell.phase)] = bool(counts)
+        return {**out, "counts": counted}
 
 
 def significance(

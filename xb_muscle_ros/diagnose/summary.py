@@ -4,27 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from xb_muscle_ros.diagnose.sentences import (
+from xb_muscle_ros.diagnose.claims import (
     Facts,
     Piece,
     Sentence,
-    answer_names,
     by_chance,
+    flexible,
+    gain,
+    judged,
+    rivals,
+    sureness,
+    together,
+)
+from xb_muscle_ros.diagnose.sentences import (
+    answer_names,
     changes,
     difference,
     explained,
     fibre_words,
-    gain,
     how_well,
     memory_law,
     next_step,
+    notes,
     parameter_value,
-    sureness,
-    together,
-    well_below,
     what_helps,
 )
-from xb_muscle_ros.diagnose.words import family_of, family_words, human, joined, parts, percent
+from xb_muscle_ros.diagnose.words import family_words, human, joined, percent
 from xb_muscle_ros.diagnose.written import filled
 
 
@@ -40,7 +45,8 @@ def summary_text(diagnosis: Facts) -> str:
 def summary_pieces(diagnosis: Facts) -> list[Piece]:
     """The paragraph in pieces, so that a page can link each number to how it was computed."""
     facts = filled(diagnosis)
-    sentences = _TELL.get(str(facts["verdict"]), _unexplained)(facts)
+    tell = _TELL.get(str(facts["verdict"]), _unexplained) if judged(facts) else _not_judged
+    sentences = [*tell(facts), *notes(facts)]
     pieces: list[Piece] = []
     for sentence in sentences:
         pieces += ([Piece(" ")] if pieces else []) + sentence
@@ -50,8 +56,8 @@ def summary_pieces(diagnosis: Facts) -> list[Piece]:
 def _none(facts: Facts) -> list[Sentence]:
     return [
         *how_well(facts, "reproduces the recordings of"),
-        *by_chance(facts, "What is left is no larger than chance makes it"),
-        [Piece("These recordings call for no other physics and no correction beyond the usual ones.")],
+        *by_chance(facts),
+        [Piece("These recordings call for no other physics and no correction of the measurement.")],
         *what_helps(facts),
     ]
 
@@ -71,7 +77,7 @@ def _parameters(facts: Facts) -> list[Sentence]:
         out += how_well(facts, "reproduces, once its own parameters are estimated anew, the recordings of")
     out += changes(facts)
     out.append([Piece("Other values of the same parameters are enough: these recordings call for no other physics.")])
-    out += by_chance(facts, "What is left is no larger than chance makes it")
+    out += by_chance(facts)
     return out + what_helps(facts)
 
 
@@ -85,7 +91,7 @@ def _measurement(facts: Facts) -> list[Sentence]:
         ],
         *gain(facts, "With that corrected"),
         *sureness(facts),
-        *by_chance(facts, "A difference this large"),
+        *by_chance(facts),
         [Piece("Check the recording for it before looking for physics.")],
         *next_step(facts),
     ]
@@ -104,50 +110,47 @@ def _physics(facts: Facts) -> list[Sentence]:
         [*what, *parameter_value(facts)],
         *gain(facts, "With the first of them" if rivals else "With it"),
         *sureness(facts),
-        *by_chance(facts, "A difference this large"),
+        *by_chance(facts),
         *next_step(facts),
     ]
 
 
 def _ambiguous(facts: Facts) -> list[Sentence]:
-    names = [human(n) for n in answer_names(facts)]
-    families = {family_of(part) for name in answer_names(facts) for part in parts(name)}
-    kin = (
-        f" All belong to one family, {family_words(facts['family'])}." if facts["family"] and len(families) == 1 else ""
-    )
-    out = difference(facts)
-    if names:
-        number = {1: "One explanation does best", 2: "Two explanations do"}.get(
-            len(names), f"{len(names)} explanations do"
-        )
-        rivals = "but is not clearly ahead of the others" if len(names) == 1 else "about equally well"
-        out.append([Piece(f"{number} {rivals}: {joined(names)}.{kin} These recordings cannot tell which is right.")])
-    else:
-        out.append([Piece("Several explanations do about equally well; these recordings cannot tell which is right.")])
-    out += gain(facts, "With the first of them" if len(names) > 1 else "With it")
-    out += by_chance(facts, "A difference this large")
-    return out + next_step(facts)
+    return [
+        *difference(facts),
+        rivals(facts),
+        *gain(facts, "With the first of them" if len(answer_names(facts)) > 1 else "With it"),
+        *sureness(facts),
+        *by_chance(facts),
+        *next_step(facts),
+    ]
 
 
 def _unexplained(facts: Facts) -> list[Sentence]:
-    tried = sum(1 for row in facts["candidates"] if row["name"] != "base")
+    rows = [row for row in facts["candidates"] if row["name"] != "base"]
+    tried = sum(1 for row in rows if row["train_rmsd_f0"] is not None)
     out = difference(facts)
     if tried > 1:
-        out.append([Piece("None of the "), Piece(f"{tried}", "candidates"), Piece(" explanations tried removes it.")])
+        none = [Piece("None of the "), Piece(f"{tried}", "candidates"), Piece(" explanations fitted removes it")]
     else:
-        out.append([Piece("The only explanation tried does not remove it." if tried else "No explanation removes it.")])
-    out += memory_law(facts)
-    bound = facts["flexible_bound_rmsd_f0"]
-    if bound is not None:
-        out.append([
-            Piece("A flexible curve without any physics gets the error on trials left out of the fit down to "),
-            Piece(f"{percent(bound)} % F0", "flexible_bound"),
-            Piece(", so there is something to be found."
-                  if well_below(bound, (facts["linear_heldout"] or {}).get("before_rmsd_f0")) else
-                  ", hardly better than the model: what it learns in some trials does not help in others."),
-        ])  # fmt: skip
-    out += by_chance(facts, "A difference this large")
-    return out + next_step(facts)
+        none = [Piece("The only explanation fitted does not remove it" if tried else "No explanation removes it")]
+    if len(rows) > tried:
+        none += [
+            Piece("; "),
+            Piece(f"{len(rows) - tried}", "candidates"),
+            Piece(" more promised too little to be fitted"),
+        ]
+    out.append([*none, Piece(".")])
+    return [*out, *memory_law(facts), *flexible(facts), *by_chance(facts), *next_step(facts)]
+
+
+def _not_judged(facts: Facts) -> list[Sentence]:
+    return [
+        *difference(facts),
+        [Piece("These recordings cannot be judged with this model, so that nothing is named.")],
+        *by_chance(facts),
+        *what_helps(facts),
+    ]
 
 
 _TELL: Mapping[str, Callable[[Facts], list[Sentence]]] = {

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from xb_muscle_ros.diagnose.catalogue import CATALOGUE
-from xb_muscle_ros.diagnose.crossval import HeldOut, difference
+from xb_muscle_ros.diagnose.crossval import HeldOut
+from xb_muscle_ros.diagnose.gain import Gain
 from xb_muscle_ros.diagnose.mismatch import Bound
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name, Verdict
 from xb_muscle_ros.diagnose.refit import Fit
 from xb_muscle_ros.diagnose.search import PENALTY, Search
+from xb_muscle_ros.diagnose.significance import ALPHA
 from xb_muscle_ros.diagnose.study import Explanation
 
 # Independent differences that a trial tells of, as a rule: residuals of a muscle hang together over a whole phase.
@@ -37,6 +39,7 @@ _AS_GOOD = 1.5
 
 _NO_FAULT = "no fault of the measurement explains as much"
 _APART = "the interval of its parameter excludes 0"
+_BETTER = "held-out trials are predicted better"
 # What rivals make fail, and so does not speak against being ambiguous.
 _OF_RIVALS = (_NO_FAULT, _APART)
 
@@ -62,17 +65,20 @@ class Decision(NamedTuple):
         verdict: as a whole.
         answer: names, best first.
         family: that all names share, or None.
-        confidence: weight of the first name among all that were fitted in its place, times what it explains.
+        confidence: weight of the first name among all that were fitted in its place, times what it explains; None
+            where nothing is named.
         checks: conditions of a named mechanism.
         ties: names that the data do not tell from the first one.
+        gain: of the explanation that was arrived at on held-out trials; None where none was, or none were held out.
     """
 
     verdict: Verdict
     answer: tuple[Name, ...]
     family: str | None
-    confidence: float
+    confidence: float | None
     checks: tuple[Check, ...]
     ties: tuple[Name, ...]
+    gain: Gain | None = None
 
 
 @dataclass(frozen=True)
@@ -110,13 +116,13 @@ def decide(e: Evidence) -> Decision:
     """The answer that the evidence allows."""
     search = e.search
     if not e.described:
-        return Decision(Verdict.UNEXPLAINED, (), None, 0.0, (), ())
+        return Decision(Verdict.UNEXPLAINED, (), None, None, (), ())
     if not e.detected:
         fine = e.start_rmsd_f0 <= max(_AS_GOOD * search.base.rmsd_f0, 0.003)
-        return Decision(Verdict.NONE if fine else Verdict.PARAMETERS, (), None, _sure(e.p_value), (), ())
+        return Decision(Verdict.NONE if fine else Verdict.PARAMETERS, (), None, None, (), ())
     explanation = search.final.explanation
     if not explanation.names:
-        return Decision(Verdict.UNEXPLAINED, (), None, _sure(1.0 - e.p_value), (), ())
+        return Decision(Verdict.UNEXPLAINED, (), None, None, (), ())
     share = explained(search.base, search.final, e.noise_f0)
     first = _by_importance(search, explanation.names)[0]
     part = [n for n in explanation.names if n is first or _comes_back(search, n, e.noise_f0) >= _PART]
@@ -127,24 +133,25 @@ def decide(e: Evidence) -> Decision:
     lead = (mechanisms or faults or list(explanation.names))[0]
     weights = weights_against(search, lead, len(search.study.trials))
     ties = tuple(n for n, w in weights.items() if n is not lead and w >= _TIE * weights[lead])
-    confidence = weights[lead] * max(0.0, min(1.0, share))
-    checks = _checks(e, lead, share, weights, bool(mechanisms))
-    answer = (
-        tuple(dict.fromkeys((*mechanisms, *faults, *ties))) if mechanisms else tuple(dict.fromkeys((*faults, *ties)))
-    )
-    family = FAMILY[lead] if all(FAMILY[n] == FAMILY[lead] for n in ties) else None
+    gain = _gain(e, bool(mechanisms))
+    checks = _checks(e, lead, share, weights, bool(mechanisms), gain)
+    none = Decision(Verdict.UNEXPLAINED, (), None, None, checks, ties, gain)
     if not (mechanisms or faults) or not _explains(search, lead, share, e.noise_f0).passed:
-        return Decision(Verdict.UNEXPLAINED, (), None, confidence, checks, ties)
-    if family is None and all(c.passed for c in checks if c.name not in _OF_RIVALS):
-        return Decision(Verdict.AMBIGUOUS, answer, None, confidence, checks, ties)
-    if not all(c.passed for c in checks):
-        return Decision(Verdict.UNEXPLAINED, (), None, confidence, checks, ties)
-    verdict = Verdict.PHYSICS if mechanisms else Verdict.MEASUREMENT
-    return Decision(verdict, answer, family, confidence, checks, ties)
+        return none
+    family = FAMILY[lead] if all(FAMILY[n] == FAMILY[lead] for n in ties) else None
+    open_to = _OF_RIVALS if family is None else ()
+    if not all(c.passed for c in checks if c.name not in open_to):
+        return none
+    answer = tuple(dict.fromkeys((*mechanisms, *faults, *ties)))
+    verdict = Verdict.AMBIGUOUS if family is None else Verdict.PHYSICS if mechanisms else Verdict.MEASUREMENT
+    confidence = weights[lead] * max(0.0, min(1.0, share))
+    return Decision(verdict, answer, family, confidence, checks, ties, gain)
 
 
-def _sure(p: float) -> float:
-    return min(max(p, 0.0), 1.0)
+def _gain(e: Evidence, physics: bool) -> Gain | None:
+    before = e.heldout.get(e.search.base.explanation.label)
+    after = e.heldout.get(e.search.final.explanation.label)
+    return None if before is None or after is None else Gain.of(before, after, not physics)
 
 
 def explained(before: Fit, after: Fit, noise_f0: float) -> float:
@@ -216,9 +223,11 @@ def weights_against(search: Search, lead: Name, trials: int) -> dict[Name, float
     return {name: value / total for name, value in raw.items()}
 
 
-def _checks(e: Evidence, lead: Name, share: float, weights: Mapping[Name, float], physics: bool) -> tuple[Check, ...]:
+def _checks(
+    e: Evidence, lead: Name, share: float, weights: Mapping[Name, float], physics: bool, gain: Gain | None
+) -> tuple[Check, ...]:
     checks = [
-        Check("the mismatch is no noise (bootstrap p < 0.01)", e.p_value < 0.01, f"p = {e.p_value:.2g}"),
+        Check(f"the mismatch is no noise (bootstrap p < {ALPHA:g})", e.p_value < ALPHA, f"p = {e.p_value:.2g}"),
         _explains(e.search, lead, share, e.noise_f0),
         Check(
             "the places where the mismatch was found are clean afterwards",
@@ -244,28 +253,15 @@ def _checks(e: Evidence, lead: Name, share: float, weights: Mapping[Name, float]
     else:
         left = e.search.final.rmsd_f0
         checks.append(Check("faults leave next to nothing", left <= _FAULTS_LEAVE_F0, f"{100.0 * left:.2f} % F0"))
-    checks += _heldout_checks(e, physics)
+    checks += _heldout_checks(e, gain)
     return tuple(checks)
 
 
-def _heldout_checks(e: Evidence, physics: bool) -> list[Check]:
-    base = e.heldout.get(e.search.base.explanation.label)
-    after = e.heldout.get(e.search.final.explanation.label)
-    if base is None or after is None:
-        return [Check("held-out trials are predicted better", False, "too few trials to hold any out")]
-    gain = difference(after, base)
-    # A trial's own offset or drift is not to be learnt from others: it is enough that most are told better.
-    better = gain.delta_elpd > 0.0
-    if physics:
-        better = after.rmsd_f0 < base.rmsd_f0 and gain.delta_elpd > gain.se
-    found = [
-        Check(
-            "held-out trials are predicted better",
-            better,
-            f"{100 * base.rmsd_f0:.2f} to {100 * after.rmsd_f0:.2f} % F0, {gain.delta_elpd:.1f} ± {gain.se:.1f}",
-        )
-    ]
-    of_flexible = e.bound.share(after.rmsd_f0) if e.bound is not None else None
+def _heldout_checks(e: Evidence, gain: Gain | None) -> list[Check]:
+    if gain is None:
+        return [Check(_BETTER, False, "too few trials to hold any out")]
+    found = [Check(_BETTER, gain.better, gain.words)]
+    of_flexible = e.bound.share(gain.after_f0) if e.bound is not None else None
     if of_flexible is not None:
         found.append(
             Check(

@@ -116,7 +116,7 @@ def parts(name: str) -> list[str]:
 def human(name: str) -> str:
     """A mechanism, fault or pair as a sentence calls it."""
     if name == "base":
-        return "the model as it is"
+        return "the base model"
     return " with ".join(_one(part).name for part in parts(name)) or name
 
 

@@ -31,7 +31,7 @@ _LISTS: Mapping[str, tuple[str, ...]] = {
     ),
     "checks": ("name", "passed", "value"),
 }  # fmt: skip
-_PLAIN_LISTS = ("answer", "missing", "warnings")
+_PLAIN_LISTS = ("answer", "missing", "warnings", "notes")
 _GROUPS: Mapping[str, tuple[str, ...]] = {
     "before": ("train_rmsd_f0", "heldout_rmsd_f0"),
     "after": ("train_rmsd_f0", "heldout_rmsd_f0"),
@@ -39,16 +39,20 @@ _GROUPS: Mapping[str, tuple[str, ...]] = {
     "how": (),
 }
 _OPTIONAL_GROUPS: Mapping[str, tuple[str, ...]] = {
-    "map": ("trials", "phases", "rms_f0", "mean_f0", "p_value"),
-    "map_after": ("trials", "phases", "rms_f0", "mean_f0", "p_value"),
+    "map": ("trials", "phases", "rms_f0", "mean_f0", "p_value", "counts"),
+    "map_after": ("trials", "phases", "rms_f0", "mean_f0", "p_value", "counts"),
     "kernel": ("time_constant_s", "scales_with", "gain", "explained", "tau_s", "weight_f0"),
     "profile": ("parameter", "unit", "points", "interval"),
+    "heldout_gain": (
+        "explanation", "before_f0", "after_f0", "usual_before_f0", "usual_after_f0", "trials", "delta_elpd", "se",
+        "of_faults", "gained_f0", "floor_f0", "better",
+    ),
     "linear_heldout": ("before_rmsd_f0", "after_rmsd_f0"),
     "next_experiment": ("bag", "protocol", "separates", "expected_difference_f0"),
-}
+}  # fmt: skip
 _SINGLE = (
     "version", "fibre", "model", "method", "quick", "seed", "seconds", "summary", "verdict", "family", "p_value",
-    "confidence", "flexible_bound_rmsd_f0", "augmented_fiber",
+    "confidence", "flexible_bound_rmsd_f0", "augmented_fiber", "described",
 )  # fmt: skip
 
 

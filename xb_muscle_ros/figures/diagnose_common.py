@@ -28,10 +28,33 @@ def label(text: object, most: int = 200) -> str:
     return line.replace("\\", "\u29f5").replace("$", r"\$")
 
 
-def trial_label(row: Any, most: int) -> str:
-    """Name of a trial and its pCa."""
-    pca = "" if row["pca"] is None else f"  pCa {row['pca']:g}"
-    return label(row["trial"], most - len(pca)) + pca
+BASE = "base model"
+"""What every figure and table calls the model with nothing added."""
+_NAME = 24
+
+
+def trial_labels(rows: Iterable[Any]) -> dict[str, str]:
+    """Names of trials with their pCa, by name: the same in every figure, and each trial's its own.
+
+    Long names go without what all begin with, then are shortened in the middle; what is still alike is numbered.
+    """
+    listed = list(rows)
+    names = [label(row["trial"], 10_000) for row in listed]
+    if max(map(len, names), default=0) > _NAME and len(names) > 1:
+        alike = itertools.takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
+        shared = names[0][: len(list(alike))]
+        shared = shared[: max((shared.rfind(mark) + 1 for mark in "_- ."), default=0)]
+        names = [f"…{name[len(shared) :]}" if shared else name for name in names]
+    short = [label(name, _NAME) for name in names]
+    short = [f"{k + 1}: {label(name, _NAME - 4)}" if short.count(name) > 1 else name for k, name in enumerate(short)]
+    return {str(row["trial"]): name + _pca(row["pca"]) for row, name in zip(listed, short, strict=True)}
+
+
+def _pca(value: float | None) -> str:
+    if value is None:
+        return ""
+    text = f"{value:g}"
+    return f"  pCa {text if '.' in text else text + '.0'}"
 
 
 def augmented(facts: Mapping[str, Any]) -> bool:
@@ -68,6 +91,25 @@ def thinned(time: Array, values: Array) -> tuple[Array, Array]:
 def pages(places: list[int], most: int) -> list[list[int]]:
     """Places in pages of so many; only the last may have fewer."""
     return [places[first : first + most] for first in range(0, len(places), most)]
+
+
+def blocks(count: int, most: int) -> list[slice]:
+    """So many things in as few blocks as hold at most that many each, all about as large."""
+    parts = np.array_split(np.arange(count), max(-(-count // most), 1))
+    return [slice(int(part[0]), int(part[-1]) + 1) for part in parts if part.size]
+
+
+def located_share(facts: Mapping[str, Any], traces: Iterable[Any]) -> float:
+    """Share of the time of all trials in which a mismatch was located."""
+    spans = [(row["trial"], row["start_s"], row["end_s"]) for row in facts["mismatch"]]
+    inside = whole = 0
+    for row, trace in zip(facts["trials"], traces, strict=True):
+        hit = np.zeros(trace.time_s.size, dtype=bool)
+        for trial, start, end in spans:
+            if trial == row["trial"] and start is not None and end is not None:
+                hit |= (trace.time_s >= start) & (trace.time_s <= end)
+        inside, whole = inside + int(np.count_nonzero(hit)), whole + hit.size
+    return inside / whole if whole else 0.0
 
 
 def svg(made: Any) -> str:

@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from xb_muscle_ros.diagnose.words import human
-from xb_muscle_ros.figures.diagnose_common import WIDTH_MM, label, svg
+from xb_muscle_ros.figures.diagnose_common import BASE, WIDTH_MM, label, svg
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
 # Kinds differ in marker and in filling, so that they are told apart in grey.
 _MARKS: Mapping[str, tuple[str, str, str, str]] = {
     "mechanism": ("o", MODEL, MODEL, "mechanism"),
-    "pair": ("D", MODEL, "white", "pair of mechanisms"),
+    "pair": ("D", MODEL, "white", "several together"),
     "measurement": ("s", SECOND, "white", "fault of the measurement"),
-    "base": ("|", "black", "black", "model as it is"),
+    "base": ("|", "black", "black", BASE),
 }
 _MOST = 34
 
@@ -33,7 +33,7 @@ def reference(rows: Sequence[Mapping[str, Any]]) -> str:
     """What differences in prediction are counted from: the row at which they are zero."""
     zero = [row for row in rows if row["delta_elpd"] == 0.0]
     if any(row["name"] == "base" for row in zero):
-        return "the model as it is"
+        return f"the {BASE}"
     return "the best" if zero and zero[0] is rows[0] else "the reference"
 
 
@@ -58,7 +58,7 @@ def draw_ranking(facts: Mapping[str, Any]) -> list[str]:
         if has_scores:
             axes[1].axvline(0.0, color=DATA, linewidth=0.7, linestyle=(0, (4, 2)), zorder=0)
             axes[1].set_xlabel("Δ elpd ± s.e. (right is better)")
-        axes[0].set_yticks(range(len(rows)), [label(human(str(row["name"])), 44) for row in rows])
+        axes[0].set_yticks(range(len(rows)), [_name(row) for row in rows])
         for tick, row in zip(axes[0].get_yticklabels(), rows, strict=True):
             tick.set_fontweight("bold" if row["name"] in _answers(facts) else "normal")
         axes[0].set_ylim(len(rows) - 0.4, -0.6)
@@ -69,6 +69,10 @@ def draw_ranking(facts: Mapping[str, Any]) -> list[str]:
             axis.spines["left"].set_visible(False)
         made.legend(handles=list(handles.values()), loc="outside upper center", ncols=4, frameon=False)
         return [svg(made)]
+
+
+def _name(row: Mapping[str, Any]) -> str:
+    return BASE if row["name"] == "base" else label(human(str(row["name"])), 44)
 
 
 def _answers(facts: Mapping[str, Any]) -> set[str]:

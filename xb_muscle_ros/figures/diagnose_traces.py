@@ -10,14 +10,16 @@ import numpy as np
 from xb_muscle_ros.diagnose.sentences import direction
 from xb_muscle_ros.diagnose.written import Trace
 from xb_muscle_ros.figures.diagnose_common import (
+    BASE,
     WIDTH_MM,
     Array,
     after_name,
     by_activation,
+    located_share,
     pages,
     svg,
     thinned,
-    trial_label,
+    trial_labels,
 )
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
@@ -31,18 +33,22 @@ _LEFT_MM = 18.5
 _GAP_MM = 10.0
 _PANEL_MM = (WIDTH_MM - _LEFT_MM - 3.0 - (_COLUMNS - 1) * _GAP_MM) / _COLUMNS
 _SHADE = "#dfe5ee"
+# Shading that covers more of the time than this tells nothing.
+_EVERYWHERE = 0.8
+_MARK_MM = 2.6
 _DASHED = (0, (4, 1.6))
 
 
 def draw_traces(facts: Mapping[str, Any], traces: Sequence[Trace]) -> list[str]:
     """Pages of at most nine trials, from low to high calcium, as SVG.
 
-    Where mismatch was located the time is shaded, and marked + where the fibre pulls harder than the base model. The
-    residual, measured minus model, has the same scale in all trials.
+    Where mismatch was located the time is shaded (unless that is nearly everywhere: see `shaded`), and marked + where
+    the fibre pulls harder than the base model. The residual, measured minus model, has the same scale in all trials.
     """
     rows = facts["trials"]
     order = by_activation(rows)
     limit = _residual_limit(traces)
+    spans, labels = shaded(facts, traces), trial_labels(rows)
     drawn = []
     for chosen in pages(order, _PER_PAGE):
         lines = -(-len(chosen) // _COLUMNS)
@@ -53,9 +59,10 @@ def draw_traces(facts: Mapping[str, Any], traces: Sequence[Trace]) -> list[str]:
             handles: dict[str, Any] = {}
             for k, i in enumerate(chosen):
                 axes = _place(made, height, k // _COLUMNS, k % _COLUMNS)
-                _spans(axes, facts, rows[i]["trial"])
+                if spans:
+                    _spans(axes, facts, rows[i]["trial"], traces[i])
                 handles |= _panel(axes, traces[i], after_name(facts))
-                axes[0].set_title(trial_label(rows[i], 34), loc="left", fontsize=7, pad=3)
+                axes[0].set_title(labels[str(rows[i]["trial"])], loc="left", fontsize=7, pad=3)
                 axes[2].set_ylim(-limit, limit)
                 _labels(axes, first=k % _COLUMNS == 0, last=k + _COLUMNS >= len(chosen))
             made.legend(
@@ -99,27 +106,38 @@ def _panel(axes: tuple[Any, Any, Any], trace: Trace, after: str) -> dict[str, An
     return handles
 
 
-def _models(trace: Trace, after_is: str = "augmented model") -> list[tuple[str, Array, str, Any, float]]:
+def _models(trace: Trace, after_is: str = "") -> list[tuple[str, Array, str, Any, float]]:
     """The base model, and the augmented one where it is another."""
     found: list[tuple[str, Array, str, Any, float]] = []
     before, after = trace.before_f0, trace.after_f0
     if before is not None:
-        found.append(("base model", before, SECOND, _DASHED, 1.0))
+        found.append((BASE, before, SECOND, _DASHED, 1.0))
     if after is not None and (before is None or not np.array_equal(before, after, equal_nan=True)):
         found.append((after_is, after, MODEL, "-", 1.0))
     return found
 
 
-def _spans(axes: Sequence[Any], facts: Mapping[str, Any], trial: str) -> None:
-    for row in facts["mismatch"]:
-        if row["trial"] != trial or row["start_s"] is None or row["end_s"] is None:
-            continue
+def shaded(facts: Mapping[str, Any], traces: Sequence[Trace]) -> bool:
+    """Whether located mismatch is shaded: not where it covers nearly all of the time."""
+    return located_share(facts, traces) <= _EVERYWHERE
+
+
+def _spans(axes: Sequence[Any], facts: Mapping[str, Any], trial: str, trace: Trace) -> None:
+    spans = [row for row in facts["mismatch"] if row["trial"] == trial and None not in (row["start_s"], row["end_s"])]
+    mm_per_s = _PANEL_MM / max(float(np.ptp(trace.time_s)), 1e-9)
+    last_mm = -np.inf
+    for row in sorted(spans, key=lambda row: float(row["start_s"])):
         for axis in axes:
             axis.axvspan(row["start_s"], row["end_s"], facecolor=_SHADE, edgecolor="white", linewidth=1.0)
+        middle_s = (row["start_s"] + row["end_s"]) / 2.0
+        # A mark that would touch the one before is left out; the table has them all.
+        if middle_s * mm_per_s - last_mm < _MARK_MM:
+            continue
+        last_mm = middle_s * mm_per_s
         mark = {1: "+", -1: "−", 0: "±"}[direction(row)]
         axes[2].text(
-            (row["start_s"] + row["end_s"]) / 2.0, 0.99, mark, transform=axes[2].get_xaxis_transform(),
-            ha="center", va="top", fontsize=8, fontweight="bold", clip_on=True,
+            middle_s, 0.99, mark, transform=axes[2].get_xaxis_transform(), ha="center", va="top", fontsize=8,
+            fontweight="bold", clip_on=True,
         )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from xb_muscle_ros.figures.diagnose_common import WIDTH_MM, after_name, by_activation, pages, svg, trial_label
+from xb_muscle_ros.figures.diagnose_common import BASE, WIDTH_MM, after_name, by_activation, pages, svg, trial_labels
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, THIRD, figure
 
 _PER_PAGE = 30
@@ -21,7 +21,7 @@ def draw_trials(facts: Mapping[str, Any]) -> list[str]:
     panels = [panel for panel in _PANELS if any(row[key] is not None for row in rows for key in panel[1:3])]
     if not panels:
         return []
-    name = after_name(facts)
+    name, labels = after_name(facts), trial_labels(rows)
     drawn = []
     for number, chosen in enumerate(pages(by_activation(rows), _PER_PAGE)):
         shown = [rows[i] for i in chosen]
@@ -43,7 +43,7 @@ def draw_trials(facts: Mapping[str, Any]) -> list[str]:
                 axis.set_axisbelow(True)
                 axis.tick_params(axis="y", length=0)
                 axis.spines["left"].set_visible(False)
-            names = (["all trials"] if number == 0 else []) + [trial_label(row, 36) for row in shown]
+            names = (["all trials"] if number == 0 else []) + [labels[str(row["trial"])] for row in shown]
             axes[0].set_yticks(range(len(names)), names, fontsize=6.5)
             axes[0].set_ylim(len(names) - 0.4, -0.6)
             axes[0].set_xlim(0.0, 1.06 * axes[0].get_xlim()[1])
@@ -62,7 +62,7 @@ def _row(
     if row[before] is not None:
         (handles["before"],) = axis.plot(
             [100.0 * row[before]], [place], "o", markersize=size, markerfacecolor="white", markeredgecolor=SECOND,
-            label="base model", linestyle="none",
+            label=BASE, linestyle="none",
         )  # fmt: skip
     if row[after] is not None and row[after] != row[before]:
         (handles["after"],) = axis.plot(

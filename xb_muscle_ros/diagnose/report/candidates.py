@@ -14,9 +14,9 @@ Facts = Mapping[str, Any]
 
 _KINDS = {
     "mechanism": "● mechanism",
-    "pair": "◇ pair",
+    "pair": "◇ several",
     "measurement": "□ measurement",
-    "base": "| as it is",
+    "base": "| base model",
 }
 
 
@@ -30,7 +30,7 @@ def candidates(page: Markup, written: Written) -> str:
         draw_ranking(facts),
         f"Explanations compared, best first: {page.number('error on trials left out', 'heldout_rmsd')} (left) and "
         f"{page.number('predictive score', 'delta_elpd')} with its standard error (right). Filled dots are mechanisms, "
-        "open squares faults of the measurement, diamonds pairs; the answer is bold.",
+        "open squares faults of the measurement, diamonds several together; the answer is bold.",
         "Explanations ranked by error on trials left out",
     )
     against = reference(chosen) if chosen else "the reference"

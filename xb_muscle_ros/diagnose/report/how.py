@@ -55,14 +55,17 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         ),
         "confidence": Kind(
             "Confidence",
-            "Weight of the answer among all candidates compared, from how well each predicts trials left out.",
+            "Weight of the answer among all that was fitted in its place, from how far each is from the data.",
+        ),
+        "heldout_gain": Kind(
+            "Usual error of a trial left out", "Geometric mean of the force RMSDs of the single trials left out."
         ),
         "delta_elpd": Kind(
             "Difference in predictive score",
             "Log density that a candidate gives to trials left out, summed over trials, minus that of the reference; "
             "the standard error is over trials.",
         ),
-        "candidates": Kind("Number of explanations", "Candidates that were looked at, without the model as it is."),
+        "candidates": Kind("Number of explanations", "Candidates that were looked at, without the base model."),
         "parameters": Kind("Parameters of a candidate", "Values at the best fit of the candidate."),
         "interval": Kind(
             "Interval of a parameter",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from xb_muscle_ros.diagnose.claims import headline
 from xb_muscle_ros.diagnose.report import sections, verdict
 from xb_muscle_ros.diagnose.report.candidates import candidates
 from xb_muscle_ros.diagnose.report.how import how_section
@@ -44,7 +45,7 @@ def as_page(written: Written) -> str:
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{escaped(title)}: {escaped(verdict.headline(facts))}</title>\n"
+        f"<title>{escaped(title)}: {escaped(headline(facts))}</title>\n"
         f"<style>{STYLE}</style>\n</head>\n<body>\n"
         f"<header><h1>{escaped(title)}</h1><p>{_model(facts)}</p></header>\n{top}\n<nav>{links}</nav>\n{body}\n"
         f"<footer>{run}</footer>\n</body>\n</html>\n"

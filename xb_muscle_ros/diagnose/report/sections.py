@@ -8,13 +8,14 @@ from typing import Any
 from xb_muscle_ros.diagnose.report.conflicts import conflicts
 from xb_muscle_ros.diagnose.report.markup import NOTHING, Markup, escaped, named, prose
 from xb_muscle_ros.diagnose.sentences import LAW, noise_from
+from xb_muscle_ros.diagnose.significance import ALPHA, FLOOR_F0
 from xb_muscle_ros.diagnose.words import SCALES, digits, human, percent, phase_words, quantity
 from xb_muscle_ros.diagnose.written import Written
 from xb_muscle_ros.figures.diagnose_common import after_name, augmented, by_activation
 from xb_muscle_ros.figures.diagnose_kernel import draw_kernel
-from xb_muscle_ros.figures.diagnose_map import draw_map
+from xb_muscle_ros.figures.diagnose_map import draw_map, framed
 from xb_muscle_ros.figures.diagnose_profile import draw_profile
-from xb_muscle_ros.figures.diagnose_traces import draw_traces
+from xb_muscle_ros.figures.diagnose_traces import draw_traces, shaded
 from xb_muscle_ros.figures.diagnose_trials import draw_trials
 
 Facts = Mapping[str, Any]
@@ -23,22 +24,28 @@ _MOST_ROWS = 20
 # Where noise was not taken from a window in which the muscle only holds: mark and words.
 _NOISE_FROM = {
     "curve": ("*", "Noise: what smooth curves leave of force, for want of enough time without movement"),
+    "differences": ("‡", "Noise: what neighbouring samples do not tell of each other"),
     "others": ("†", "Noise: like that of the other trials"),
 }
+
+
+_NOWHERE = (
+    f"No place counts: none is both beyond chance (p < {ALPHA:g}, all places together) and larger than "
+    f"{percent(FLOOR_F0)} % F0 for a tenth of a second."
+)
 
 
 def where(page: Markup, written: Written) -> str:
     """Mismatches located, and the map before and after."""
     facts = written.facts
     if not facts["mismatch"]:
-        return f"<p>No place stands out beyond chance.</p>\n{_map(page, facts)}"
+        return f"<p>{prose(_NOWHERE)}</p>\n{_map(page, facts)}"
     pca_of = {row["trial"]: row["pca"] for row in facts["trials"]}
     rows = [("", _mismatch(page, row, pca_of)) for row in facts["mismatch"][:_MOST_ROWS]]
     more = len(facts["mismatch"]) - len(rows)
     caption = (
-        "Where the base model, with its parameters and the usual corrections fitted, differs by more than chance; "
-        "largest first. Size is the root mean square there."
-        + (f" {more} smaller ones are in <code>diagnosis.json</code>." if more else "")
+        "Where the base model, with its parameters fitted, differs by more than chance; largest first. Size is the "
+        "root mean square there." + (f" {more} smaller ones are in <code>diagnosis.json</code>." if more else "")
     )
     head = ["Phase", "Trial", "pCa", "From–to (s)", "Size (% F<sub>0</sub>)", "Mean (% F<sub>0</sub>)", "p"]
     return f"{_map(page, facts)}\n{page.table(caption, head, rows, words=2)}\n{conflicts(page, facts)}"
@@ -50,10 +57,16 @@ def _map(page: Markup, facts: Facts) -> str:
         "Measured minus modelled force in each phase of each trial, from low to high calcium, in % F<sub>0</sub>. "
         f"Upper number and colour: {page.number('mean', 'map')} (orange, +: the fibre pulls harder than the model; "
         f"violet, −: less). Small number: {page.number('root mean square', 'map')}, bold with ± where it is more than "
-        "twice the mean: there the difference goes both ways. Heavy frame: beyond chance "
-        f"({page.number('p < 0.05', 'cell_p_value')}, all cells together). Hatched: the trial has no such phase.",
+        f"twice the mean: there the difference goes both ways. {_frames(page, facts)} Hatched: the trial has no such "
+        "phase.",
         "Heat map of the residual over trials and phases",
     )
+
+
+def _frames(page: Markup, facts: Facts) -> str:
+    number = page.number(f"p < {ALPHA:g}", "cell_p_value")
+    counts = f"beyond chance ({number}, all cells together) and larger than {percent(FLOOR_F0)} % F<sub>0</sub>"
+    return f"Heavy frame: {counts}." if framed(facts) else f"Every cell is {counts}, so none is framed."
 
 
 def _mismatch(page: Markup, row: Facts, pca_of: Mapping[str, Any]) -> list[str]:
@@ -75,12 +88,18 @@ def _mismatch(page: Markup, row: Facts, pca_of: Mapping[str, Any]) -> list[str]:
 def traces(page: Markup, written: Written) -> str:
     """Every trial: length, forces and residuals."""
     residual = page.number("residual", "rmsd")
+    if shaded(written.facts, written.traces):
+        shade = (
+            "Shaded: located mismatch of the base model, + where the fibre pulls harder than the model, − where less, "
+            "± where both."
+        )
+    else:
+        shade = "Nothing is shaded, as mismatch of the base model was located nearly everywhere."
     return page.figure(
         draw_traces(written.facts, written.traces),
         "Length (top), force measured (grey) and modelled (middle), and what is left, measured minus modelled force "
         f"({residual}, bottom; same scale in all trials), from low to high calcium. Dashed orange: base model with its "
-        f"parameters and corrections fitted. Blue: {after_name(written.facts)}, where there is one. Shaded: located "
-        "mismatch of the base model, + where the fibre pulls harder than the model, − where less, ± where both.",
+        f"parameters fitted. Blue: {after_name(written.facts)}, where there is one. {shade}",
         "Measured and modelled force of every trial",
     )
 
@@ -199,7 +218,7 @@ def estimates(page: Markup, written: Written) -> str:
     if facts["nuisances"]:
         rows = [("", _nuisance(page, row)) for row in facts["nuisances"]]
         caption = (
-            "Corrections of the measurement in every model, the base included, with the size to expect beforehand."
+            "Corrections of the measurement that were fitted as part of the answer, with the size to expect beforehand."
         )
         out.append(page.table(caption, ["Correction", "Of", "Value ± s.d.", "Expected ±", "Unit"], rows, words=2))
     if facts["base_parameters"]:

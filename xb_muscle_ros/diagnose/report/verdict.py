@@ -2,79 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
+from xb_muscle_ros.diagnose.claims import QUIET, Facts, Sentence, headline, sureness, what_it_means
 from xb_muscle_ros.diagnose.report.markup import Markup, escaped, listed, prose
-from xb_muscle_ros.diagnose.sentences import together
 from xb_muscle_ros.diagnose.summary import summary_pieces, summary_text
-from xb_muscle_ros.diagnose.words import chance, family_words, human, joined, likely, meaning, percent
-
-Facts = Mapping[str, Any]
-
-_HEADLINES = {
-    "none": "Nothing beyond chance",
-    "measurement": "A fault of the measurement",
-    "parameters": "Other parameter values, no other physics",
-    "physics": "Physics that was left out",
-    "ambiguous": "More than one explanation",
-    "unexplained": "A real difference that nothing tried explains",
-}
-_MEANINGS = {
-    "none": "The model as it is, with its parameters and the usual corrections of the measurement estimated, leaves no "
-    "more than noise like that of the recordings does.",
-    "parameters": "The model reproduces the recordings once its own parameters are estimated anew. What differs can be "
-    "had from the parameters; an effect that parameters can imitate cannot be seen in these recordings.",
-    "ambiguous": "These explain the recordings about equally well. An experiment has to decide between them.",
-    "unexplained": "The difference is beyond chance, but no mechanism or fault offered removes it. It is described "
-    "below, not explained.",
-}
+from xb_muscle_ros.diagnose.words import chance, family_words, human, joined, meaning, percent
 
 
 def lead(page: Markup, facts: Facts) -> str:
     """The summary; its numbers are links where it is the tool's own text."""
     if facts["summary"] and facts["summary"] != summary_text(facts):
         return f'<p class="lead">{prose(facts["summary"])}</p>'
-    pieces = summary_pieces(facts)
-    return f'<p class="lead">{"".join(page.number(p.text, p.how) if p.how else prose(p.text) for p in pieces)}</p>'
-
-
-def headline(facts: Facts) -> str:
-    """The verdict in a line of plain text."""
-    words = _HEADLINES.get(str(facts["verdict"]), "No verdict")
-    names = [human(str(name)) for name in facts["answer"]]
-    if not names:
-        return words
-    rivals = "and" if together(facts) or facts["verdict"] == "measurement" else "or"
-    return f"{words}: {joined(names, rivals)}"
+    return f'<p class="lead">{_linked(page, summary_pieces(facts))}</p>'
 
 
 def verdict_box(page: Markup, facts: Facts) -> str:
     """Verdict, what it means, how sure, and the few numbers it rests on."""
-    told = [_MEANINGS[facts["verdict"]]] if facts["verdict"] in _MEANINGS else []
+    told = [text for text in (what_it_means(facts),) if text]
     named = [str(name) for name in facts["answer"]]
     told += [f"{human(name)[:1].upper()}{human(name)[1:]}: {meaning(name)}." for name in named if meaning(name)]
     if facts["family"] and told:
         told[-1] += f" Family: {family_words(str(facts['family']))}."
+    sure = "".join(f"<p>{_linked(page, sentence)}</p>" for sentence in sureness(facts))
     return (
         f'<section class="verdict" id="verdict"><p class="kicker">Verdict</p><h2>{prose(headline(facts))}</h2>'
         + "".join(f"<p>{prose(text)}</p>" for text in told)
-        + f"<p>{_confidence(page, facts)}</p>"
+        + sure
         + _facts(page, facts)
         + "</section>"
     )
 
 
-def _confidence(page: Markup, facts: Facts) -> str:
-    share = facts["confidence"]
-    if share is None:
-        return "How sure this is was not computed."
-    number = page.number(f"{100.0 * share:.0f} %", "confidence")
-    if facts["verdict"] in ("none", "parameters"):
-        return f"That no explanation offered does better is <b>{likely(share)}</b> ({number})."
-    if facts["verdict"] in ("ambiguous", "unexplained"):
-        return f"That the first of the explanations compared is right is <b>{likely(share)}</b> ({number})."
-    return f"That this is right, among the explanations compared, is <b>{likely(share)}</b> ({number})."
+def _linked(page: Markup, sentence: Sentence) -> str:
+    return "".join(page.number(p.text, p.how) if p.how else prose(p.text) for p in sentence)
 
 
 def _facts(page: Markup, facts: Facts) -> str:
@@ -108,8 +69,10 @@ def checks(page: Markup, facts: Facts) -> str:
         return ""
     failed = sum(1 for row in facts["checks"] if row["passed"] is False)
     summary = "All passed." if not failed else f"{failed} of {len(items)} failed."
-    if failed and facts["verdict"] in ("none", "parameters"):
+    if failed and facts["verdict"] in QUIET:
         summary += " Where nothing is missing they are not expected to pass."
+    elif failed and facts["verdict"] == "ambiguous":
+        summary += " Those that ask for a single explanation may fail where several tie."
     return f"<h2>Checks</h2><p>What has to hold before a mechanism is named. {summary}</p>{listed(items, 'list')}"
 
 
@@ -120,6 +83,7 @@ def next_steps(page: Markup, facts: Facts) -> str:
         + _files(facts)
         + _notes("What is missing", facts["missing"])
         + _notes("Warnings", facts["warnings"])
+        + _notes("Assumed, left out, not looked at", facts["notes"])
     )
 
 

@@ -27,6 +27,8 @@ class Source(str, Enum):
     """Its force while it only holds."""
     CURVE = "curve"
     """What smooth curves leave of its force."""
+    DIFFERENCES = "differences"
+    """What neighbouring samples do not tell of each other."""
     OTHERS = "others"
     """The noise of the other trials."""
 

@@ -26,8 +26,10 @@ _ENDS = 0.1
 # Times of neighbouring exponentials are this factor apart; the longest is a piece's duration over it.
 _APART = 4.0
 _DEGREE = 3
-# A piece has this many samples for each column that is taken out of it at least.
+# A piece has this many samples for each column that is taken out of it at least. Where no trial of a study has such
+# pieces, shorter ones have to do: of so many samples, and so many more than columns.
 _FOR_EACH = 2
+_SHORT, _SPARE = 8, 3
 # Sampled evenly: this share of steps is within this factor of the median one.
 _EVENLY, _STEP = 0.9, 2.0
 
@@ -54,17 +56,24 @@ def evenly_sampled(trial: Trial) -> bool:
     return float(np.mean(alike)) >= _EVENLY
 
 
-def smooth_pieces(trial: Trial) -> list[Piece]:
+def smooth_pieces(trial: Trial, short: bool = False) -> list[Piece]:
     """The pieces of a trial in which length stands still; where there is none, those in which it moves steadily.
 
     Force that is being stretched out of a muscle yields, which no exponential follows as well as it does a recovery.
+
+    Args:
+        trial: of any sampling.
+        short: take pieces of few samples as well.
     """
     still: list[Piece] = []
     moving: list[Piece] = []
     for phase in trial.facts.phases or (Phase("whole", float(trial.time_s[0]), float(trial.time_s[-1])),):
         inside = _samples(trial, phase)
         time_s = trial.force_time_s[inside]
-        if time_s.size < LEAST or time_s.size < _FOR_EACH * (1 + curves(time_s).shape[1]):
+        if time_s.size < (_SHORT if short else LEAST):
+            continue
+        columns = curves(time_s).shape[1]
+        if time_s.size < (columns + _SPARE if short else _FOR_EACH * (1 + columns)):
             continue
         travel_l0 = _steady_travel_l0(trial, float(time_s[0]), float(time_s[-1]))
         if travel_l0 is not None:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.special import ndtri
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.scores.noise.differences import LEAST_DIFFERENCES, by_differences
 from xb_muscle_ros.scores.noise.estimate import alike, by_regressions
 from xb_muscle_ros.scores.noise.memories import Timed, by_memories
 from xb_muscle_ros.scores.noise.model import MEMBERS, NoiseModel, Source, TrialNoise
@@ -34,10 +35,11 @@ def noise_of(trials: Sequence[Trial]) -> NoiseModel:
     """Noise of the trials of a study.
 
     Of evenly sampled ones from the windows in which the muscle only holds; where these have too few samples, and of
-    unevenly sampled ones, from what smooth curves leave of force; of the others from that of those.
+    unevenly sampled ones, from what smooth curves leave of force; of the others from that of those. Where no trial has
+    either, from curves through few samples, and failing that from what neighbouring samples do not tell of each other.
 
     Raises:
-        UserError: no trial has enough samples of either kind, or a force is not finite.
+        UserError: no trial has enough samples for any of that, or a force is not finite.
     """
     for trial in trials:
         if not np.all(np.isfinite(trial.force_n)):
@@ -47,10 +49,13 @@ def noise_of(trials: Sequence[Trial]) -> NoiseModel:
     enough = sum(noise.samples for noise in known.values()) >= ENOUGH
     by_pieces = [t for t in trials if not (enough and even[t.facts.trial])]
     known |= by_curves({t.facts.trial: smooth_pieces(t) for t in by_pieces}, even)
+    known = known or by_curves({t.facts.trial: smooth_pieces(t, short=True) for t in trials}, even)
+    known = known or by_differences(trials)
     if not known:
+        longest = max((t.force_time_s.size for t in trials), default=0)
         raise UserError(
-            f"no trial holds still or moves at a constant rate for {LEAST} samples of force, so that its noise is "
-            "unknown; give at least one trial with a longer pause"
+            f"no trial has more than {longest} samples of force, so that noise is unknown; at least "
+            f"{LEAST_DIFFERENCES} in one trial are needed"
         )
     steps_s = {t.facts.trial: _step_s(t.force_time_s) if even[t.facts.trial] else math.nan for t in trials}
     return completed(known, steps_s)
@@ -77,7 +82,11 @@ def by_curves(pieces: Mapping[str, Sequence[Piece]], even: Mapping[str, bool]) -
         even: whether its force is sampled evenly.
     """
     drifts = {name: [(p, curves(p.time_s)) for p in of] for name, of in pieces.items() if of}
-    fast = {n: of for n, of in drifts.items() if even[n] and _step_s(of[0][0].time_s) <= _HUM_S}
+    fast = {
+        n: of
+        for n, of in drifts.items()
+        if even[n] and _step_s(of[0][0].time_s) <= _HUM_S and all(p.time_s.size >= LEAST for p, _ in of)
+    }
     width = max((drift.shape[1] for of in fast.values() for _, drift in of), default=0)
     parts = {n: [Part(_step_s(p.time_s), p.force_f0, drift, width) for p, drift in of] for n, of in fast.items()}
     timed = {n: [Timed(p.time_s, p.force_f0, drift) for p, drift in of] for n, of in drifts.items() if n not in fast}
