@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from made_evidence import TRIALS, evidence, fit, scores
 
+from xb_muscle_ros.diagnose import run
 from xb_muscle_ros.diagnose.crossval import HeldOut
 from xb_muscle_ros.diagnose.mismatch import Bound
 from xb_muscle_ros.diagnose.names import Name, Verdict
@@ -140,3 +141,14 @@ def test_weights_are_shares_and_follow_the_fit() -> None:
     weights = weights_against(e.search, Name.VISCOUS_DRAG, 7)
     assert sum(weights.values()) == pytest.approx(1.0)
     assert weights[Name.VISCOUS_DRAG] > weights[Name.WEAKLY_BOUND_HEADS] > weights[Name.TIME_SHIFT] > 0.0
+
+
+def test_the_next_experiment_separates_different_mechanisms(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same two in another order are no rival of theirs."""
+    pair = fit(0.001, Name.VISCOUS_DRAG, Name.LATTICE_SPACING)
+    again = fit(0.00101, Name.LATTICE_SPACING, Name.VISCOUS_DRAG)
+    search = evidence(pair, again, fit(0.002, Name.WEAKLY_BOUND_HEADS)).search
+    monkeypatch.setattr(run, "propose", lambda _, first, second, pcas: (first, second))
+    first, second = run._proposal(search, decide(evidence(pair, again)), [])  # type: ignore[misc]
+    assert first is pair
+    assert second.explanation.names == (Name.WEAKLY_BOUND_HEADS,)

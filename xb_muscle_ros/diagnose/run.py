@@ -218,7 +218,9 @@ def _proposal(search: Search, decision: Decision, trials: Sequence[Trial]) -> Pr
     first = search.final if search.final.explanation.mechanisms else next(iter(of_mechanisms), None)
     if first is None:
         return None
-    others = [f for f in of_mechanisms if f.explanation.mechanisms != first.explanation.mechanisms]
+    # The same mechanisms in another order are no rival.
+    own = set(first.explanation.mechanisms)
+    others = [f for f in of_mechanisms if set(f.explanation.mechanisms) != own]
     ties = [f for f in others if set(f.explanation.names) & set(decision.ties)]
     second = next(iter([*ties, *others]), search.base)
     return propose(search.study, first, second, chosen)
