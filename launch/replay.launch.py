@@ -26,7 +26,7 @@ def generate_launch_description() -> LaunchDescription:
         DeclareLaunchArgument(
             "out",
             default_value="replay",
-            description="folder for the report, figure and bags; those of an older replay are replaced",
+            description="folder for results, in the place of older ones",
         ),
     ]
     node = Node(
