@@ -32,10 +32,15 @@ class StateViolation(UserError):
         super().__init__(
             f"fibre {fibre}: state {state} became {value:.6g} at t = {time_s:.6g} s; allowed is {allowed}; {remedy}"
         )
+        self._made_of = (fibre, state, time_s, value, allowed, remedy)
         self.fibre = fibre
         self.state = state
         self.time_s = time_s
         self.value = value
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickled by what it was made of: one text, as for other errors, does not make it anew in another process."""
+        return type(self), self._made_of, {"args": self.args}
 
 
 @contextlib.contextmanager

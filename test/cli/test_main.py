@@ -41,7 +41,7 @@ def test_simulate_then_replay_the_same_model(bag: Path, tmp_path: Path, capsys: 
 def test_other_sets_and_fibres(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["replay", str(bag), "--fiber", "13Dec2017a", "--model", "2state", "--out", str(tmp_path)]
     assert main(arguments) == 0
-    assert "is of fibre 18Dec2017a" in capsys.readouterr().err
+    assert "1 of 1 trials are of fibre 18Dec2017a, replayed with parameters of 13Dec2017a" in capsys.readouterr().err
     assert json.loads((tmp_path / "replay.json").read_text())["trials"][0]["model"] == "2state"
 
 
@@ -79,7 +79,7 @@ def test_malformed_fibre_file(bag: Path, tmp_path: Path, capsys: pytest.CaptureF
     ("arguments", "words"),
     [
         (["--pca", "99"], "--pca is 99"),
-        (["--amplitude", "-0.1"], "amplitude_l0 is -0.1"),
+        (["--amplitude", "-0.1"], "--amplitude is -0.1 L0; allowed is 0 to 0.5 L0"),
         (["--rate", "0"], "--rate is 0"),
     ],
 )

@@ -64,28 +64,32 @@ def test_measured_only_needs_no_fibre_file(make: Maker, recorded: Callable[..., 
 
 def test_a_bag_of_a_fibre_that_was_not_given(make: Maker, repo_root: Path) -> None:
     path = make()
-    files = {"13Dec2017a": repo_root / "config" / "fibers" / "13Dec2017a.yaml"}
+    names = ("13Dec2017a", "7Aug2018a")
+    files = {name: repo_root / "config" / "fibers" / f"{name}.yaml" for name in names}
     (task,) = bags.tasks([path], files, None, None)
     assert (
-        "the bag's fibre is '18Dec2017a', the fibre files given are of 13Dec2017a" in bags.evaluate_bag(task)["problem"]
+        "the bag's fibre is '18Dec2017a', the fibre files given are of 13Dec2017a, 7Aug2018a; give its file too"
+        in bags.evaluate_bag(task)["problem"]
     )
 
 
-def test_a_bag_of_a_fibre_nobody_knows_takes_the_one_file_given(
-    make: Maker, recorded: Callable[..., Trial], repo_root: Path
+@pytest.mark.parametrize("name", ["mine", "7Aug2018a"])
+def test_a_bag_of_another_fibre_takes_the_one_file_given(
+    make: Maker, recorded: Callable[..., Trial], repo_root: Path, name: str
 ) -> None:
     """As a replay does; with two files there is nothing to choose by."""
     trial = recorded()
-    path = make(replace(trial, facts=replace(trial.facts, fibre="mine")))
+    path = make(replace(trial, facts=replace(trial.facts, fibre=name)))
     folder = repo_root / "config" / "fibers"
-    files = {name: folder / f"{name}.yaml" for name in ("18Dec2017a", "13Dec2017a")}
+    files = {each: folder / f"{each}.yaml" for each in ("18Dec2017a", "13Dec2017a")}
     (task,) = bags.tasks([path], {"18Dec2017a": files["18Dec2017a"]}, ["3state_coop"], None)
     found = bags.evaluate_bag(task)
-    assert found["trial"]["fibre"] == "mine"
+    assert found["trial"]["fibre"] == name
     assert found["models"]["3state_coop"]["rmsd_f0"]["whole"] == pytest.approx(0.02, abs=1e-6)
-    for given in (files, None):
-        (task,) = bags.tasks([path], given, ["3state_coop"], None)
-        assert bags.evaluate_bag(task)["unserved"] == "mine"
+    (task,) = bags.tasks([path], files, ["3state_coop"], None)
+    assert bags.evaluate_bag(task)["unserved"] == name
+    (task,) = bags.tasks([path], None, ["3state_coop"], None)
+    assert bags.evaluate_bag(task).get("unserved") == ("mine" if name == "mine" else None)
 
 
 def test_nan_in_a_bag_is_told_with_topic_and_time(make: Maker, recorded: Callable[..., Trial]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -29,7 +30,7 @@ def shortening() -> Trial:
 def test_a_model_that_pushes_is_told_once_with_trial_force_and_time(muscle: Muscle) -> None:
     trial = shortening()
     simulated = simulate_trial(muscle, trial)
-    told = pushing(trial, simulated, "3state_coop")
+    told = pushing([trial], [simulated], "3state_coop")
     assert told is not None
     assert told.startswith("trial vmax: model 3state_coop pushes, force falls to -0.")
     assert f"at t = {trial.time_s[int(np.argmin(simulated.force_n))]:g} s" in told
@@ -37,7 +38,9 @@ def test_a_model_that_pushes_is_told_once_with_trial_force_and_time(muscle: Musc
     slack = Muscle(load_fibre("18Dec2017a", "3state_coop_slack"))
     there = simulate_trial(slack, trial)
     assert there.force_n.min() >= 0.0
-    assert pushing(trial, there, "3state_coop_slack") is None
+    assert pushing([trial], [there], "3state_coop_slack") is None
+    both = pushing([trial, trial], [simulated, simulated], "3state_coop")
+    assert both == told.replace("trial vmax:", "trial vmax (and in 1 more trials):")
 
 
 def test_a_failing_simulation_names_its_trial(muscle: Muscle) -> None:
@@ -51,3 +54,10 @@ def test_naming_keeps_the_kind_of_error_and_its_facts() -> None:
     with pytest.raises(StateViolation, match=r"^trial x: fibre f: state q0 became 2") as caught, naming("trial x"):
         raise StateViolation("f", "q0", 0.1, 2.0, "0 to 1", "check")
     assert (caught.value.state, caught.value.time_s) == ("q0", 0.1)
+
+
+def test_an_error_that_names_a_state_goes_to_another_process_whole() -> None:
+    error = StateViolation("f", "q0", 0.1, 2.0, "0 to 1", "check")
+    error.args = (f"trial x: {error}",)
+    there = pickle.loads(pickle.dumps(error))
+    assert (str(there), there.state, there.time_s) == (str(error), "q0", 0.1)

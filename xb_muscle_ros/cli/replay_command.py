@@ -48,9 +48,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise UserError("--live gives the node a fibre file as it is; put the values of --set into a file of your own")
     fibre = fibre_of(arguments)
     trials = study_of(arguments, fibre).trials
-    for trial in trials:
-        if trial.facts.fibre != fibre.name:
-            warn(f"trial {trial.facts.trial} is of fibre {trial.facts.fibre}, replayed with parameters of {fibre.name}")
+    others = [trial.facts.fibre for trial in trials if trial.facts.fibre != fibre.name]
+    if others:
+        whose = ", ".join(dict.fromkeys(others))
+        warn(f"{len(others)} of {len(trials)} trials are of fibre {whose}, replayed with parameters of {fibre.name}")
     check_room(arguments.out, trials, arguments.overwrite)
     player: Player | None = None
     if arguments.live:
@@ -59,10 +60,9 @@ def run(arguments: argparse.Namespace) -> int:
 
         player = play_live
     results = replay(trials, fibre, player, arguments.substeps, arguments.settle)
-    for trial, simulated in zip(trials, results.simulated, strict=True):
-        told = pushing(trial, simulated, fibre.model)
-        if told:
-            warn(told)
+    told = pushing(trials, results.simulated, fibre.model)
+    if told:
+        warn(told)
     print(results.table)
     for path in write_results(arguments.out, trials, results):
         print(path)

@@ -87,28 +87,24 @@ class NoFibreFile(UserError):
 def file_serving(files: Mapping[str, str | Path] | None, fibre: str) -> Path:
     """Fibre file whose parameters serve a trial; see `served_line` for what there is to say of it.
 
-    That of its fibre's name; for a name that is not known, as in a replay, the one file that was given.
+    That of its fibre's name; else, as in a replay, the one file that was given.
 
     Args:
         files: that were given, by the fibre's name; None: those of the package.
         fibre: name in the trial.
 
     Raises:
-        NoFibreFile: several were given and none is the fibre's, one was given and the package has the fibre's own, or
-            none was given and the package has none.
+        NoFibreFile: several were given and none is the fibre's, or none was given and the package has none.
     """
-    if files is not None and fibre in files:
-        return Path(files[fibre])
-    try:
-        packaged = find_fibre_file(fibre)
-    except UserError as error:
-        if files is None:
+    if files is None:
+        try:
+            return find_fibre_file(fibre)
+        except UserError as error:
             raise NoFibreFile(fibre, f"{error}; give a fibre file with --fiber") from error
-        if len(files) == 1:
-            return Path(next(iter(files.values())))
-    else:
-        if files is None:
-            return packaged
+    if fibre in files:
+        return Path(files[fibre])
+    if len(files) == 1:
+        return Path(next(iter(files.values())))
     raise NoFibreFile(
         fibre, f"the bag's fibre is '{fibre}', the fibre files given are of {', '.join(files)}; give its file too"
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -74,22 +74,25 @@ def as_simulated(muscle: Muscle, trial: Trial, time_s: Array, states: Array) -> 
 _PUSHES_F0 = -1e-3
 
 
-def pushing(trial: Trial, simulated: Simulated, model: str) -> str | None:
+def pushing(trials: Sequence[Trial], simulated: Sequence[Simulated], model: str) -> str | None:
     """One line on a model that pushes, where a muscle would be slack; None where it pulls.
 
     Args:
-        trial, simulated: the trial and what the model made of it.
+        trials, simulated: trials and what the model made of each.
         model: its name, or that of its parameter set.
     """
-    k = int(np.argmin(simulated.force_n))
-    force_f0 = float(simulated.force_n[k]) / trial.facts.f0_n
-    if force_f0 >= _PUSHES_F0:
+    lowest = [float(np.min(one.force_n)) / trial.facts.f0_n for trial, one in zip(trials, simulated, strict=True)]
+    pushed = [i for i, force_f0 in enumerate(lowest) if force_f0 < _PUSHES_F0]
+    if not pushed:
         return None
+    worst = min(pushed, key=lambda i: lowest[i])
+    at_s = simulated[worst].time_s[int(np.argmin(simulated[worst].force_n))]
+    more = f" (and in {len(pushed) - 1} more trials)" if len(pushed) > 1 else ""
     slack = slack_of(model)
     remedy = f"; in model {slack} the series spring goes slack (docs/model.md)" if slack else ""
     return (
-        f"trial {trial.facts.trial}: model {model} pushes, force falls to {force_f0:.3g} F0 at "
-        f"t = {simulated.time_s[k]:g} s, where a muscle would be slack{remedy}"
+        f"trial {trials[worst].facts.trial}{more}: model {model} pushes, force falls to {lowest[worst]:.3g} F0 at "
+        f"t = {at_s:g} s, where a muscle would be slack{remedy}"
     )
 
 
