@@ -18,7 +18,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.scores.estimate import rounded
 from xb_muscle_ros.scores.noise.autocovariance import covariance_of_sums
 from xb_muscle_ros.scores.noise.hum import Line, hum
-from xb_muscle_ros.scores.noise.model import TrialNoise
+from xb_muscle_ros.scores.noise.model import Source, TrialNoise
 from xb_muscle_ros.scores.noise.pieces import evenly_sampled
 from xb_muscle_ros.scores.noise.trials import ENOUGH, by_windows, noise_of
 from xb_muscle_ros.scores.noise.windows import LEAST, isometric_window
@@ -82,9 +82,11 @@ def force_noise(trial: Trial) -> ForceNoise | None:
             lines, rest = hum(window.step_s, window.force_f0) if enough else ((), window.force_f0)
             return ForceNoise(by_windows([window._replace(force_f0=rest)])[name], step_s, lines)
     try:
-        return ForceNoise(noise_of([trial]).trials[0], step_s)
+        noise = noise_of([trial]).trials[0]
     except UserError:
         return None
+    # Differences of neighbours show fast noise alone, an estimate's error depends on the slow.
+    return None if noise.source is Source.DIFFERENCES else ForceNoise(noise, step_s)
 
 
 NO_NOISE_KNOWN = "standard error not known: no quiet time to take the noise from"

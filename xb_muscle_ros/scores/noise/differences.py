@@ -1,6 +1,6 @@
 """Noise of trials in which nothing runs smoothly for long enough: what neighbouring samples do not tell of each other.
 
-Each sample is foretold by the cubic through its four neighbours (Gasser, Sroka and Jennen-Steinmetz, Biometrika 73
+Each sample is predicted by the cubic through its four neighbours (Gasser, Sroka and Jennen-Steinmetz, Biometrika 73
 (1986) 625-633, with two). Half of the samples lie where force bends little, so the median of what is left is the
 noise's. It shows only what is fast: how much slower noise there is beside it is taken from measured fibres, and drawn.
 """
