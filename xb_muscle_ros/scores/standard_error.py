@@ -85,8 +85,9 @@ def force_noise(trial: Trial) -> ForceNoise | None:
         noise = noise_of([trial]).trials[0]
     except UserError:
         return None
-    # Differences of neighbours show fast noise alone, an estimate's error depends on the slow.
-    return None if noise.source is Source.DIFFERENCES else ForceNoise(noise, step_s)
+    # Few samples and differences of neighbours show fast noise alone; an estimate's error depends on the slow.
+    fast = noise.source is Source.DIFFERENCES or noise.samples < LEAST
+    return None if fast else ForceNoise(noise, step_s)
 
 
 NO_NOISE_KNOWN = "standard error not known: no quiet time to take the noise from"
