@@ -70,7 +70,7 @@ def _trials(path: Path, fitted: Fitted) -> list[Path]:
 def _panel(upper: Any, lower: Any, fitted: Fitted, trial: Any) -> list[Any]:
     time, problem = trial.force_time_s, fitted.problem
     measured = trial.measured_f0
-    lines = upper.plot(time, measured, color=DATA, linewidth=2.0, label="measured")
+    lines = upper.plot(time, measured, color=DATA, linewidth=0.9, label="measured")
     start = _force(problem, problem.start, trial)
     if start is not None:
         lines += upper.plot(time, start, color=SECOND, linestyle=(0, (4, 2)), linewidth=0.9, label="start")

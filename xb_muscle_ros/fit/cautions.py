@@ -8,12 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.ends import BOUND, PRIOR, UNSEEN, UNSETTLED
 from xb_muscle_ros.fit.methods import fast_form
 from xb_muscle_ros.fit.run import Fitted
 from xb_muscle_ros.fit.start import null_lines
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.fit.uncertainty import correlation
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.replay.offline import one_for_all, pushing_line
 
 # From here on two coordinates are told to be hardly told apart.
 _TWINS = 0.95
@@ -52,7 +55,7 @@ def cautions(fitted: Fitted, parameters: Sequence[Mapping[str, Any]], trials: Se
     nowhere = [row["trial"] for row in trials if row["rmsd_f0"] is None]
     if nowhere:
         found.append(f"the fitted model has no solution in {', '.join(nowhere)}: in no RMSD, and in no figure")
-    return found
+    return found + _pushing(fitted)
 
 
 def _idle(fitted: Fitted) -> list[int]:
@@ -64,11 +67,28 @@ def _idle(fitted: Fitted) -> list[int]:
     return [int(j) for j in np.flatnonzero(moved < _NO_EFFECT)]
 
 
+def _pushing(fitted: Fitted) -> list[str]:
+    """Whether the fitted model bears force where a muscle would be slack; one line for all trials."""
+    problem, z, lines = fitted.problem, fitted.best.z, []
+    muscle = Muscle(problem.fibre_at(z))
+    for trial in problem.trials:
+        try:
+            (force,) = problem.true_forces(muscle, z, [trial])
+        except UserError:
+            continue  # Told of already.
+        lines.append(pushing_line(trial.name, problem.fibre.model, trial.time_s, force))
+    return one_for_all([line for line in lines if line])
+
+
 def _of_parameter(label: str, row: Mapping[str, Any]) -> list[str]:
     found = []
     if row["at_bound"]:
         bound = row["bounds"][0 if row["at_bound"] == "lower" else 1]
-        found.append(f"{label} is at its {row['at_bound']} bound, {bound:g} {row['unit']}; widen it, or fix it there")
+        unit = "" if row["unit"] == "1" else f" {row['unit']}"
+        # No option widens the bounds of a fault of the measurement.
+        fault = ", which no option moves: leave this fault out, or look for another"
+        remedy = "; widen it, or fix it there" if row["group"] is None else fault
+        found.append(f"{label} is at its {row['at_bound']} bound, {bound:g}{unit}{remedy}")
     if row["group"] is not None:
         return found
     ends = dict(zip(_SIDES, row["interval_ended_by"], strict=True))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -81,16 +81,26 @@ def pushing(trial: Trial, simulated: Simulated, model: str) -> str | None:
         trial, simulated: the trial and what the model made of it.
         model: its name, or that of its parameter set.
     """
-    k = int(np.argmin(simulated.force_n))
-    force_f0 = float(simulated.force_n[k]) / trial.facts.f0_n
-    if force_f0 >= _PUSHES_F0:
+    return pushing_line(trial.facts.trial, model, simulated.time_s, simulated.force_n / trial.facts.f0_n)
+
+
+def pushing_line(trial: str, model: str, time_s: Array, force_f0: Array) -> str | None:
+    """The line of `pushing`, from the name of a trial and its force, shape (n,), s and F0."""
+    k = int(np.argmin(force_f0))
+    if force_f0[k] >= _PUSHES_F0:
         return None
     slack = slack_of(model)
     remedy = f"; in model {slack} the series spring goes slack (docs/model.md)" if slack else ""
     return (
-        f"trial {trial.facts.trial}: model {model} pushes, force falls to {force_f0:.3g} F0 at "
-        f"t = {simulated.time_s[k]:g} s, where a muscle would be slack{remedy}"
+        f"trial {trial}: model {model} pushes, force falls to {force_f0[k]:.3g} F0 at t = {time_s[k]:g} s, where a "
+        f"muscle would be slack{remedy}"
     )
+
+
+def one_for_all(lines: Sequence[str]) -> list[str]:
+    """The first of the lines of `pushing`, and of how many more trials the same is true."""
+    more = len(lines) - 1
+    return [f"{lines[0]}; likewise in {more} more trial{'s' * (more > 1)}" if more else lines[0]] if lines else []
 
 
 Simulator = Callable[[Trial], Simulated]
