@@ -16,14 +16,13 @@ from xb_muscle_ros.fit.start import null_lines
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.fit.uncertainty import correlation
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.models.strain_bins import wide_bins_line
 from xb_muscle_ros.replay.offline import one_for_all, pushing_line
 
 # From here on two coordinates are told to be hardly told apart.
 _TWINS = 0.95
 # Starts that end this much above the best one in RMSD ended elsewhere.
 _SAME = 0.05
-# Sums over bins h apart miss a normal density of standard deviation w by 2 exp(-2 (pi w / h)^2): at 1.25 by 7e-6.
-_WIDEST_BIN = 1.25
 # A coordinate's prior SD (or a factor of e, without) moves no sample by more than this, F0 or standard deviations.
 _NO_EFFECT = 1e-9
 _SIDES = ("below", "above")
@@ -155,14 +154,8 @@ def _of_grid(fitted: Fitted) -> list[str]:
     fibre = problem.fibre_at(fitted.best.z)
     if fast_form(problem) is problem:
         return []
-    width = 2.0 * fibre.values["strain_range"] / (fibre.values["bins"] - 1.0)
-    attaching = fibre.values["w"]
-    if width > _WIDEST_BIN * attaching:
-        enough = math.ceil(2.0 * fibre.values["strain_range"] / (_WIDEST_BIN * attaching)) + 1
-        found.append(
-            f"strain bins of {width:.2g} power strokes are too wide for heads that attach with an sd of "
-            f"{attaching:.2g}: forces err in jumps of up to some 0.1 % F0; use --set bins={enough} or more"
-        )
+    wide = wide_bins_line(fibre.values)
+    found += [wide] if wide else []
     if not fitted.method_settled:
         found.append(
             f"the fit by {fibre.method} did not settle: the corrected Gaussian form is {fitted.mismatch_f0:.1g} F0 off;"
