@@ -22,7 +22,7 @@ def test_bins_are_too_wide_where_force_is_off(bins: int, told: bool) -> None:
     line = wide_bins_line(fibre.values)
     assert bool(line) == told
     if told:
-        assert line.endswith("use --set bins=145 or more")
+        assert line.endswith("take 145 bins or more")
         assert abs(force / right - 1.0) > 1e-5
     else:
         assert force == pytest.approx(right, rel=1e-4)

@@ -137,7 +137,7 @@ def value_lines(models: Sequence[ModelSet]) -> list[str]:
         wide = {name: wide_bins_line(fibre.values) for name, fibre in each.fibres.items()}
         for line in dict.fromkeys(line for line in wide.values() if line):
             named = ", ".join(name for name, text in wide.items() if text == line)
-            lines.append(f"model {each.name}, fibre {named}: {line.partition('; ')[0]}; give the fibre file more bins")
+            lines.append(f"model {each.name}, fibre {named}: {line}")
     return lines
 
 

@@ -61,7 +61,9 @@ def _trials(path: Path, fitted: Fitted) -> list[Path]:
             handles: list[Any] = []
             for (upper, lower), trial in zip(panels(made, len(shown), _LOOK), shown, strict=True):
                 handles = _panel(upper, lower, fitted, trial)
-            made.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False)
+            # One panel is narrower than all names side by side.
+            columns = len(handles) if len(shown) > 1 else 2
+            made.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False)
             save(made, here)
         pages.append(here)
     return pages

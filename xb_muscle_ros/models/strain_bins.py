@@ -25,5 +25,5 @@ def wide_bins_line(values: Mapping[str, float]) -> str:
     missed = min(2.0 * math.exp(-2.0 * (math.pi * attaching / width) ** 2), 1.0)
     return (
         f"strain bins of {width:.2g} power strokes are too wide for heads that attach with an sd of {attaching:.2g}: "
-        f"attachment errs by up to {100.0 * missed:.3g} %, and jumps as bins move; use --set bins={enough} or more"
+        f"attachment errs by up to {100.0 * missed:.3g} %, and jumps as bins move; take {enough} bins or more"
     )
