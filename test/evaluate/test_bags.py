@@ -275,3 +275,18 @@ def test_a_recorded_release_gives_k_tr(make: Maker, recorded: Callable[..., Tria
     (found,) = found_in(make(made))
     assert found["measured"]["k_tr"]["k_per_s"] == pytest.approx(4.0, rel=1e-4)
     assert found["models"]["3state_coop"]["k_tr"]["k_per_s"] > 0.0
+
+
+def test_models_that_push_are_told_once_each(make: Maker, recorded: Callable[..., Trial]) -> None:
+    """A release by a fifth of the length within 2 ms: a tendon would be slack, the models' spring is not."""
+    slack = recorded()
+    released = np.interp(slack.time_s, [0.03, 0.032], [1.0, 0.8])
+    trial = replace(slack, length_m=released, facts=replace(slack.facts, amplitude_l0=None, recovery_s=None, phases=()))
+    paths = [make(trial, name) for name in ("one", "two")]
+    kept = Trials(2)
+    for index, found in enumerate(found_in(*paths, models=("2state", "hill_se", "2state_slack"))):
+        assert "problem" not in found, found
+        kept.add(index, found)
+    (line,) = [line for line in kept.warnings if "pushes" in line]
+    assert "model 2state pushes, force falls to -0." in line
+    assert line.endswith("in model 2state_slack the series spring goes slack (docs/model.md); likewise in 1 more trial")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from xb_muscle_ros.fit.cautions import _of_parameter
 from xb_muscle_ros.fit.coordinates import Choice, parameter_coordinates
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.ends import quadratic_ends
@@ -126,3 +127,21 @@ def test_quadratic_ends_of_two_correlated_coordinates(start: Fibre) -> None:
     assert ended(0.1, near) == ["data", "data"]
     weak[0] = True
     assert ended(0.1, b) == ["nothing", "nothing"]
+
+
+def test_a_fitted_model_that_pushes_is_told(start: Fibre, isometric: Trial) -> None:
+    released = np.interp(isometric.time_s, [0.1, 0.102], [1.0, 0.8])
+    report = found(start, replace(isometric, length_m=released), ["f"], None)
+    (line,) = [line for line in report["warnings"] if "pushes" in line]
+    assert line.startswith("trial still_6.1: model 3state_coop pushes, force falls to -0.")
+    assert not any("pushes" in line for line in found(start, isometric, ["f"], None)["warnings"])
+
+
+def test_bounds_of_a_fault_cannot_be_widened() -> None:
+    row = {"at_bound": "lower", "bounds": [0.0, 0.02], "unit": "s", "group": ""}
+    (line,) = _of_parameter("transducer_lag", row)
+    assert line == (
+        "transducer_lag is at its lower bound, 0 s, which no option moves: leave this fault out, or look for another"
+    )
+    row = {"at_bound": "upper", "bounds": [0.0, 5.0], "unit": "1", "group": None, "interval_ended_by": ["data", "data"]}
+    assert _of_parameter("JF", row) == ["JF is at its upper bound, 5; widen it, or fix it there"]

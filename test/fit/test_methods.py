@@ -173,7 +173,7 @@ def test_interrupted_grid_fit_goes_on_where_it_was(
 def test_bins_wider_than_attachment_are_told(grid_problem: Problem, grid_fitted: Fitted) -> None:
     coarse = replace(grid_problem, fibre=changed(grid_problem.fibre, {"bins": 101.0}, "test"))
     line = next(line for line in warned(replace(grid_fitted, problem=coarse)) if "bins" in line)
-    assert "use --set bins=145 or more" in line
+    assert "take 145 bins or more" in line
 
 
 def test_a_fit_that_did_not_settle_is_told(grid_fitted: Fitted) -> None:

@@ -102,7 +102,10 @@ def test_splits(hold_out: list[str], train: list[str], preset: str | None, wante
     [
         ("pca", "is not KEY=VALUE"),
         ("pca=x", "'x' is not a number"),
-        ("pca=5", "no trial meets"),
+        ("pca=5", "no trial meets the rule 'pca=5'; pca of the trials: 4.5, 6.1, 6.3$"),
+        ("amplitude=3.83", "amplitude of the trials: 0, 0.0362, 0.0383 L0$"),
+        ("recovery=100", "recovery of the trials: 0.001, 0.1, 1 s$"),
+        ("trial=ramp", "trials are ramp_1, ramp_2, triangle, long$"),
         ("pka=5", "did you mean"),
     ],
 )

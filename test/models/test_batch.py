@@ -49,3 +49,10 @@ def test_mixed_batches_are_refused() -> None:
         MuscleBatch([one, exact])
     with pytest.raises(UserError, match="at least one fibre"):
         MuscleBatch([])
+
+
+def test_one_step_for_all_fibres() -> None:
+    batch = MuscleBatch([load_fibre(name) for name in FIBRES[:2]])
+    states = batch.settle(np.zeros(2), np.ones(2))
+    with pytest.raises(UserError, match="step of 2 fibres is an array; needed is one number of seconds"):
+        batch.step(states, np.zeros(2), np.ones(2), np.full(2, 1e-3))  # type: ignore[arg-type]

@@ -30,7 +30,7 @@ def shortening() -> Trial:
 def test_a_model_that_pushes_is_told_once_with_trial_force_and_time(muscle: Muscle) -> None:
     trial = shortening()
     simulated = simulate_trial(muscle, trial)
-    told = pushing([trial], [simulated], "3state_coop")
+    told = pushing(trial, simulated, "3state_coop")
     assert told is not None
     assert told.startswith("trial vmax: model 3state_coop pushes, force falls to -0.")
     assert f"at t = {trial.time_s[int(np.argmin(simulated.force_n))]:g} s" in told
@@ -38,9 +38,7 @@ def test_a_model_that_pushes_is_told_once_with_trial_force_and_time(muscle: Musc
     slack = Muscle(load_fibre("18Dec2017a", "3state_coop_slack"))
     there = simulate_trial(slack, trial)
     assert there.force_n.min() >= 0.0
-    assert pushing([trial], [there], "3state_coop_slack") is None
-    both = pushing([trial, trial], [simulated, simulated], "3state_coop")
-    assert both == told.replace("trial vmax:", "trial vmax (and in 1 more trials):")
+    assert pushing(trial, there, "3state_coop_slack") is None
 
 
 def test_a_failing_simulation_names_its_trial(muscle: Muscle) -> None:

@@ -44,10 +44,13 @@ def fibre_of(arguments: argparse.Namespace, for_fit: bool = False) -> Fibre:
     """
     from xb_muscle_ros.models.catalogue import without_effect_line
     from xb_muscle_ros.models.fibre_file import borrowed_line, changed, load_fibre
+    from xb_muscle_ros.models.strain_bins import wide_bins_line
 
     fibre = load_fibre(arguments.fiber, arguments.model, arguments.method, for_fit)
     fibre = changed(fibre, dict(arguments.changes), "--set")
-    for line in (borrowed_line(fibre), "" if for_fit else without_effect_line(fibre.model, fibre.values)):
+    # A fit says these of the values that it ends with.
+    of_values = () if for_fit else (without_effect_line(fibre.model, fibre.values), wide_bins_line(fibre.values))
+    for line in (borrowed_line(fibre), *of_values):
         if line:
             warn(line)
     return fibre

@@ -35,7 +35,7 @@ def add(subparsers: Subparsers) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Replay, print the table, write the files."""
     from xb_muscle_ros.errors import UserError
-    from xb_muscle_ros.replay.offline import pushing
+    from xb_muscle_ros.replay.offline import one_for_all, pushing
     from xb_muscle_ros.replay.run import Player, check_room, replay, write_results
 
     if not 1 <= arguments.substeps <= 10000:
@@ -60,9 +60,9 @@ def run(arguments: argparse.Namespace) -> int:
 
         player = play_live
     results = replay(trials, fibre, player, arguments.substeps, arguments.settle)
-    told = pushing(trials, results.simulated, fibre.model)
-    if told:
-        warn(told)
+    told = [pushing(*pair, fibre.model) for pair in zip(trials, results.simulated, strict=True)]
+    for line in one_for_all([line for line in told if line]):
+        warn(line)
     print(results.table)
     for path in write_results(arguments.out, trials, results):
         print(path)

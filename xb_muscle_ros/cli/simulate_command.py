@@ -88,7 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
             trial = replace(trial, force_time_s=trial.time_s, force_n=simulated.force_n)
         write_trial(path, trial, simulated)
         low, high = simulated.force_n.min(), simulated.force_n.max()
-        told = pushing([trial], [simulated], fibre.model)
+        told = pushing(trial, simulated, fibre.model)
         if told:
             warn(told)
         print(f"{path}: {trial.time_s.size} samples, force {low:.3f} to {high:.3f} F0")

@@ -16,7 +16,7 @@ from xb_muscle_ros.evaluate.checks import check_trial
 from xb_muscle_ros.evaluate.sets import NoFibreFile, file_serving
 from xb_muscle_ros.models.fibre_file import Fibre, base_set, fibre_folders, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.replay.offline import pushing, simulate_trial
 from xb_muscle_ros.scores.conditions import nominal
 from xb_muscle_ros.scores.enhancement import AFTER_S, Side, enhancement
 from xb_muscle_ros.scores.estimate import Missing
@@ -106,8 +106,9 @@ def evaluate_bag(task: Mapping[str, Any]) -> Found:
     Returns:
         ``bag``; then ``several``: the fibres of a bag that has more than one, where the task does not choose; or
         ``problem``: one line, and ``unserved``: its fibre, where no file serves that; or ``warnings``, ``trial``
-        (facts), ``measured`` and ``models``: what `answer` says of each force, models with ``rmsd_f0`` as well;
-        ``missing``: models without parameter set; ``notes``: lines on facts that are not the bag's own.
+        (facts), ``measured`` and ``models``: what `answer` says of each force, models with ``rmsd_f0`` and ``pushes``
+        (a line or None) as well; ``missing``: models without parameter set; ``notes``: lines on facts that are not the
+        bag's own.
     """
     label = f"{task['bag']}, fibre {task['fibre']}" if "fibre" in task else task["bag"]
     found: Found = {"bag": label}
@@ -136,7 +137,7 @@ def evaluate_bag(task: Mapping[str, Any]) -> Found:
             if muscle is None:
                 found["missing"].append(name)
             else:
-                found["models"][name] = _compared(trial, muscle, task["settle_s"])
+                found["models"][name] = _compared(trial, muscle, name, task["settle_s"])
     except UserError as error:
         text = str(error).replace(task["path"], task["bag"])
         unserved = {"unserved": error.fibre} if isinstance(error, NoFibreFile) else {}
@@ -249,13 +250,14 @@ def _trial(bag: TrialBag, task: Mapping[str, Any]) -> tuple[Trial, tuple[str, ..
     return trial_of_bag(bag, name, known, task["bag"] if "bag" in task else str(bag.path))
 
 
-def _compared(trial: Trial, muscle: Muscle, settle_s: float | None) -> Found:
+def _compared(trial: Trial, muscle: Muscle, name: str, settle_s: float | None) -> Found:
     simulated = simulate_trial(muscle, trial, settle_s=settle_s)
     force = simulated.force_n / trial.facts.f0_n
     at_measured = np.interp(trial.force_time_s, simulated.time_s, force)
     found = answer(trial, simulated.time_s, force)
     if found["k_tr"] is not None:
         found["k_tr"]["se_per_s"] = None  # no noise
+    found["pushes"] = pushing(trial, simulated, name)
     found["rmsd_f0"] = {
         name: force_rmsd(trial.force_time_s, at_measured, trial.measured_f0, window)
         for name, window in windows(trial).items()

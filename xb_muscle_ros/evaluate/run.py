@@ -16,7 +16,7 @@ from xb_muscle_ros.evaluate import grid, more_scores, sections
 from xb_muscle_ros.evaluate.golden import GOLDEN, OURS, golden_sources
 from xb_muscle_ros.evaluate.paper import Source, compare, readings_table
 from xb_muscle_ros.evaluate.report import write_up
-from xb_muscle_ros.evaluate.sets import ModelSet, file_serving, gather, null_lines, served_line
+from xb_muscle_ros.evaluate.sets import ModelSet, file_serving, gather, served_line, value_lines
 from xb_muscle_ros.evaluate.srs_scores import ALL_READINGS, READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, read_table, read_tables
 from xb_muscle_ros.evaluate.tables_text import write_csv
@@ -189,7 +189,7 @@ def _recordings(request: Request, results: Results, tell: Callable[[str], None])
         # Fibres without a file of their own may share one.
         named = list(dict.fromkeys(file_serving(files, name) for name in trials.fibres))
         results.models = gather(named, request.models, request.method)
-        results.warnings += null_lines(results.models)
+        results.warnings += value_lines(results.models)
     found_sections = results.sections
     found_sections["sets"] = sections.sets_section(results.models)
     found_sections["trials"] = {

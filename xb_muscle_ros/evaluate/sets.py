@@ -15,6 +15,7 @@ from xb_muscle_ros.models.catalogue import without_effect_line
 from xb_muscle_ros.models.fibre_file import Fibre, base_set, find_fibre_file, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.registry import base_of, compose, model_of_set
+from xb_muscle_ros.models.strain_bins import wide_bins_line
 
 ORDER = ("hill", "hill_se", "2state", "2state_coop", "3state_coop", "4state_coop")
 """Models by the number of their states, simplest first (van der Zee et al. 2026)."""
@@ -120,8 +121,8 @@ def served_line(files: Mapping[str, str | Path] | None, fibres: Sequence[str]) -
     )
 
 
-def null_lines(models: Sequence[ModelSet]) -> list[str]:
-    """For each set with mechanisms whose effect is exactly zero in a fibre, one line."""
+def value_lines(models: Sequence[ModelSet]) -> list[str]:
+    """For each set with mechanisms whose effect is exactly zero in a fibre, or with bins too wide, one line."""
     lines = []
     for each in models:
         told = {name: without_effect_line(each.name, fibre.values) for name, fibre in each.fibres.items()}
@@ -129,6 +130,10 @@ def null_lines(models: Sequence[ModelSet]) -> list[str]:
             named = ", ".join(name for name, text in told.items() if text == line)
             # Values are not given on the command line here.
             lines.append(f"model {each.name}, fibre {named}: {line.partition('; ')[0]}; fit it first")
+        wide = {name: wide_bins_line(fibre.values) for name, fibre in each.fibres.items()}
+        for line in dict.fromkeys(line for line in wide.values() if line):
+            named = ", ".join(name for name, text in wide.items() if text == line)
+            lines.append(f"model {each.name}, fibre {named}: {line}")
     return lines
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable
+from xb_muscle_ros.replay.offline import one_for_all
 from xb_muscle_ros.scores.conditions import AMPLITUDES_L0, CONDITIONS, RECOVERIES_S
 from xb_muscle_ros.trials.trial import Array
 
@@ -47,6 +48,7 @@ class Trials:
         self.unserved: dict[str, list[str]] = {}
         self.missing: dict[str, set[str]] = {}
         self._warnings: dict[int, list[str]] = {}
+        self._pushes: dict[str, dict[int, str]] = {}
         self._why: dict[int, dict[str, dict[str, str]]] = {}
         self._codes: dict[str, int] = {}
         self._code = np.full(bags, -1)
@@ -77,6 +79,8 @@ class Trials:
             _put(self.models[name], index, values)
             for window in WINDOWS:
                 self.models[name][f"rmsd_{window}"][index] = _number(values["rmsd_f0"][window])
+            if values.get("pushes"):
+                self._pushes.setdefault(name, {})[index] = values["pushes"]
         for name in found["missing"]:
             self.missing.setdefault(name, set()).add(facts["fibre"])
         if found["warnings"]:
@@ -98,8 +102,11 @@ class Trials:
 
     @property
     def warnings(self) -> list[str]:
-        """All warnings, in order of the bags."""
-        return [line for index in sorted(self._warnings) for line in self._warnings[index]]
+        """All warnings, in order of the bags; then one for each model that pushes where a muscle would be slack."""
+        lines = [line for index in sorted(self._warnings) for line in self._warnings[index]]
+        for told in self._pushes.values():
+            lines += one_for_all([told[index] for index in sorted(told) if self._code[index] >= 0])
+        return lines
 
     def why(self, index: int, of: str) -> dict[str, str]:
         """What a trial lacks that could be expected, measured or by a model, and why."""

@@ -61,7 +61,9 @@ def _trials(path: Path, fitted: Fitted) -> list[Path]:
             handles: list[Any] = []
             for (upper, lower), trial in zip(panels(made, len(shown), _LOOK), shown, strict=True):
                 handles = _panel(upper, lower, fitted, trial)
-            made.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False)
+            # One panel is narrower than all names side by side.
+            columns = len(handles) if len(shown) > 1 else 2
+            made.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False)
             save(made, here)
         pages.append(here)
     return pages
@@ -70,7 +72,7 @@ def _trials(path: Path, fitted: Fitted) -> list[Path]:
 def _panel(upper: Any, lower: Any, fitted: Fitted, trial: Any) -> list[Any]:
     time, problem = trial.force_time_s, fitted.problem
     measured = trial.measured_f0
-    lines = upper.plot(time, measured, color=DATA, linewidth=2.0, label="measured")
+    lines = upper.plot(time, measured, color=DATA, linewidth=0.9, label="measured")
     start = _force(problem, problem.start, trial)
     if start is not None:
         lines += upper.plot(time, start, color=SECOND, linestyle=(0, (4, 2)), linewidth=0.9, label="start")

@@ -8,19 +8,21 @@ from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.ends import BOUND, PRIOR, UNSEEN, UNSETTLED
 from xb_muscle_ros.fit.methods import fast_form
 from xb_muscle_ros.fit.run import Fitted
 from xb_muscle_ros.fit.start import null_lines
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.fit.uncertainty import correlation
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.models.strain_bins import wide_bins_line
+from xb_muscle_ros.replay.offline import one_for_all, pushing_line
 
 # From here on two coordinates are told to be hardly told apart.
 _TWINS = 0.95
 # Starts that end this much above the best one in RMSD ended elsewhere.
 _SAME = 0.05
-# Sums over bins h apart miss a normal density of standard deviation w by 2 exp(-2 (pi w / h)^2): at 1.25 by 7e-6.
-_WIDEST_BIN = 1.25
 # A coordinate's prior SD (or a factor of e, without) moves no sample by more than this, F0 or standard deviations.
 _NO_EFFECT = 1e-9
 _SIDES = ("below", "above")
@@ -52,7 +54,7 @@ def cautions(fitted: Fitted, parameters: Sequence[Mapping[str, Any]], trials: Se
     nowhere = [row["trial"] for row in trials if row["rmsd_f0"] is None]
     if nowhere:
         found.append(f"the fitted model has no solution in {', '.join(nowhere)}: in no RMSD, and in no figure")
-    return found
+    return found + _pushing(fitted)
 
 
 def _idle(fitted: Fitted) -> list[int]:
@@ -64,11 +66,28 @@ def _idle(fitted: Fitted) -> list[int]:
     return [int(j) for j in np.flatnonzero(moved < _NO_EFFECT)]
 
 
+def _pushing(fitted: Fitted) -> list[str]:
+    """Whether the fitted model bears force where a muscle would be slack; one line for all trials."""
+    problem, z, lines = fitted.problem, fitted.best.z, []
+    muscle = Muscle(problem.fibre_at(z))
+    for trial in problem.trials:
+        try:
+            (force,) = problem.true_forces(muscle, z, [trial])
+        except UserError:
+            continue  # Told of already.
+        lines.append(pushing_line(trial.name, problem.fibre.model, trial.time_s, force))
+    return one_for_all([line for line in lines if line])
+
+
 def _of_parameter(label: str, row: Mapping[str, Any]) -> list[str]:
     found = []
     if row["at_bound"]:
         bound = row["bounds"][0 if row["at_bound"] == "lower" else 1]
-        found.append(f"{label} is at its {row['at_bound']} bound, {bound:g} {row['unit']}; widen it, or fix it there")
+        unit = "" if row["unit"] == "1" else f" {row['unit']}"
+        # No option widens the bounds of a fault of the measurement.
+        fault = ", which no option moves: leave this fault out, or look for another"
+        remedy = "; widen it, or fix it there" if row["group"] is None else fault
+        found.append(f"{label} is at its {row['at_bound']} bound, {bound:g}{unit}{remedy}")
     if row["group"] is not None:
         return found
     ends = dict(zip(_SIDES, row["interval_ended_by"], strict=True))
@@ -135,14 +154,8 @@ def _of_grid(fitted: Fitted) -> list[str]:
     fibre = problem.fibre_at(fitted.best.z)
     if fast_form(problem) is problem:
         return []
-    width = 2.0 * fibre.values["strain_range"] / (fibre.values["bins"] - 1.0)
-    attaching = fibre.values["w"]
-    if width > _WIDEST_BIN * attaching:
-        enough = math.ceil(2.0 * fibre.values["strain_range"] / (_WIDEST_BIN * attaching)) + 1
-        found.append(
-            f"strain bins of {width:.2g} power strokes are too wide for heads that attach with an sd of "
-            f"{attaching:.2g}: forces err in jumps of up to some 0.1 % F0; use --set bins={enough} or more"
-        )
+    wide = wide_bins_line(fibre.values)
+    found += [wide] if wide else []
     if not fitted.method_settled:
         found.append(
             f"the fit by {fibre.method} did not settle: the corrected Gaussian form is {fitted.mismatch_f0:.1g} F0 off;"

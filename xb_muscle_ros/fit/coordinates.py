@@ -262,7 +262,8 @@ def fault_coordinates(
         row = FAULTS[name]
         sd = sds.get(name, row.sd)
         if not sd > 0.0:
-            raise UserError(f"measurement fault '{name}': sd {sd:g} {row.unit}; allowed is above 0")
+            unit = "" if row.unit == "1" else f" {row.unit}"
+            raise UserError(f"measurement fault '{name}': sd {sd:g}{unit}; allowed is above 0")
         groups = {Scope.TRIAL: trials, Scope.SOLUTION: solutions, Scope.STUDY: ("",)}[row.scope]
         found += [Coordinate(name, g, False, row.lower, row.upper, 0.0, 0.0, sd) for g in dict.fromkeys(groups)]
     return tuple(found)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import fnmatch
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.trials.trial import TrialFacts
@@ -11,6 +11,14 @@ from xb_muscle_ros.trials.trial import TrialFacts
 # Conditions are nominal; measured amplitudes differ from them by up to 6 %.
 _NEAR = {"pca": 0.01, "amplitude": 0.003, "recovery": 0.0}
 _RECOVERY_FACTOR = 1.5
+
+
+# What a rule's number is compared with, and its unit.
+_READ: Mapping[str, tuple[str, Callable[[TrialFacts], float | None]]] = {
+    "pca": ("", lambda facts: facts.pca),
+    "amplitude": (" L0", lambda facts: facts.amplitude_l0),
+    "recovery": (" s", lambda facts: facts.recovery_s),
+}
 
 
 def _close(key: str, value: float | None, wanted: float) -> bool:
@@ -34,12 +42,17 @@ def _rule(text: str) -> Callable[[TrialFacts], bool]:
         wanted = float(value)
     except ValueError:
         raise UserError(f"rule '{text}': '{value}' is not a number; for example {key}=6.3") from None
-    read: dict[str, Callable[[TrialFacts], float | None]] = {
-        "pca": lambda facts: facts.pca,
-        "amplitude": lambda facts: facts.amplitude_l0,
-        "recovery": lambda facts: facts.recovery_s,
-    }
-    return lambda facts: _close(key, read[key](facts), wanted)
+    return lambda facts: _close(key, _READ[key][1](facts), wanted)
+
+
+def _there(key: str, trials: Sequence[TrialFacts]) -> str:
+    """What a rule could have named: numbers with their unit, so that one in per cent is seen for what it is."""
+    if key not in _READ:
+        return f"trials are {', '.join(facts.trial for facts in trials)}"
+    unit, read = _READ[key]
+    numbers = sorted({value for value in map(read, trials) if value is not None})
+    shown = ", ".join(f"{number:g}" for number in numbers)
+    return f"{key} of the trials: {shown}{unit}" if numbers else f"no trial says its {key}"
 
 
 def paper_training(facts: TrialFacts) -> bool:
@@ -71,7 +84,7 @@ def held_out(
         raise UserError(f"split '{preset}' is not known; there is paper")
     for text in (*hold_out, *train):
         if not any(_rule(text)(facts) for facts in trials):
-            raise UserError(f"no trial meets the rule '{text}'; trials are {', '.join(f.trial for f in trials)}")
+            raise UserError(f"no trial meets the rule '{text}'; {_there(text.partition('=')[0], trials)}")
     out, wanted = [_rule(text) for text in hold_out], [_rule(text) for text in train]
     return [
         any(rule(facts) for rule in out)

@@ -64,6 +64,8 @@ def check_many(
     for name, values in (("length changes", length_change_l0), ("calcium", calcium_um)):
         if values.shape != (count,):
             raise UserError(f"{name} of {count} fibres has shape {values.shape}; needed is ({count},)")
+    if getattr(dt_s, "shape", ()):
+        raise UserError(f"step of {count} fibres is an array; needed is one number of seconds for all")
     k = first_refused(length_change_l0, calcium_um)
     if k < 0 and 0.0 < dt_s <= LONGEST_S:
         return

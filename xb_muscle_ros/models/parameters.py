@@ -53,12 +53,13 @@ def checked(name: str, value: object, table: Mapping[str, Parameter], where: str
     if name not in table:
         raise UserError(f"{where}: parameter '{name}' is not known{suggest(name, table)}")
     row = table[name]
-    allowed = f"allowed is {row.lower:g} to {row.upper:g} {row.unit}"
+    unit = "" if row.unit == "1" else f" {row.unit}"
+    allowed = f"allowed is {row.lower:g} to {row.upper:g}{unit}"
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise UserError(f"{where}: parameter '{name}' is {value!r}, not a number; {allowed} ({row.meaning})")
     number = float(value)
     if not math.isfinite(number) or not row.lower <= number <= row.upper:
-        raise UserError(f"{where}: parameter '{name}' is {number:g} {row.unit}; {allowed} ({row.meaning})")
+        raise UserError(f"{where}: parameter '{name}' is {number:g}{unit}; {allowed} ({row.meaning})")
     return number
 
 

@@ -21,6 +21,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.models.strain_bins import wide_bins_line
 from xb_muscle_ros.node.graph import Namesakes, survive_wrong_transitions
 from xb_muscle_ros.node.inlet import Inlet
 from xb_muscle_ros.node.inlet_many import InletOfMany
@@ -115,6 +116,9 @@ class MuscleNode(LifecycleNode):
         names = enumerated([fibre.name for fibre in fibres])
         who = f"fibre {names}" if len(fibres) == 1 else f"{len(fibres)} fibres ({names})"
         self.get_logger().info(f"{who}, model {fibres[0].model}, mode {self._mode}; {_constants(fibres)}")
+        for line in dict.fromkeys(wide_bins_line(fibre.values) for fibre in fibres):
+            if line:
+                self.get_logger().warning(line)
         return super().on_configure(state)
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:

@@ -145,9 +145,9 @@ def check_value(name: str, row: Row, value: object) -> Value:
     # A bool is a number too, and within infinite bounds.
     assert isinstance(value, (bool, int, float))
     if not row.lower <= value <= row.upper:
+        unit = "" if row.unit in ("", "1") else f" {row.unit}"
         raise UserError(
-            f"parameter '{name}' is {value:g} {row.unit}; allowed is {row.lower:g} to {row.upper:g} {row.unit} "
-            f"({row.meaning})"
+            f"parameter '{name}' is {value:g}{unit}; allowed is {row.lower:g} to {row.upper:g}{unit} ({row.meaning})"
         )
     return value
 

@@ -74,26 +74,33 @@ def as_simulated(muscle: Muscle, trial: Trial, time_s: Array, states: Array) -> 
 _PUSHES_F0 = -1e-3
 
 
-def pushing(trials: Sequence[Trial], simulated: Sequence[Simulated], model: str) -> str | None:
+def pushing(trial: Trial, simulated: Simulated, model: str) -> str | None:
     """One line on a model that pushes, where a muscle would be slack; None where it pulls.
 
     Args:
-        trials, simulated: trials and what the model made of each.
+        trial, simulated: the trial and what the model made of it.
         model: its name, or that of its parameter set.
     """
-    lowest = [float(np.min(one.force_n)) / trial.facts.f0_n for trial, one in zip(trials, simulated, strict=True)]
-    pushed = [i for i, force_f0 in enumerate(lowest) if force_f0 < _PUSHES_F0]
-    if not pushed:
+    return pushing_line(trial.facts.trial, model, simulated.time_s, simulated.force_n / trial.facts.f0_n)
+
+
+def pushing_line(trial: str, model: str, time_s: Array, force_f0: Array) -> str | None:
+    """The line of `pushing`, from the name of a trial and its force, shape (n,), s and F0."""
+    k = int(np.argmin(force_f0))
+    if force_f0[k] >= _PUSHES_F0:
         return None
-    worst = min(pushed, key=lambda i: lowest[i])
-    at_s = simulated[worst].time_s[int(np.argmin(simulated[worst].force_n))]
-    more = f" (and in {len(pushed) - 1} more trials)" if len(pushed) > 1 else ""
     slack = slack_of(model)
     remedy = f"; in model {slack} the series spring goes slack (docs/model.md)" if slack else ""
     return (
-        f"trial {trials[worst].facts.trial}{more}: model {model} pushes, force falls to {lowest[worst]:.3g} F0 at "
-        f"t = {at_s:g} s, where a muscle would be slack{remedy}"
+        f"trial {trial}: model {model} pushes, force falls to {force_f0[k]:.3g} F0 at t = {time_s[k]:g} s, where a "
+        f"muscle would be slack{remedy}"
     )
+
+
+def one_for_all(lines: Sequence[str]) -> list[str]:
+    """The first of the lines of `pushing`, and of how many more trials the same is true."""
+    more = len(lines) - 1
+    return [f"{lines[0]}; likewise in {more} more trial{'s' * (more > 1)}" if more else lines[0]] if lines else []
 
 
 Simulator = Callable[[Trial], Simulated]
