@@ -70,7 +70,8 @@ def trial_of_bag(bag: TrialBag, fibre: str, known: Known, where: str) -> tuple[T
     reading = bag.reading(fibre)
     trial, notes = complete(reading, known)
     told = "f0_n" not in reading.unknown or known.f0_n is not None or known.file_f0_n != 1.0
-    return replace(trial, warnings=(*trial.warnings, *check_values(trial, where, told))), notes
+    lines = check_values(trial, where, told, "pca" not in reading.unknown)
+    return replace(trial, warnings=(*trial.warnings, *lines)), notes
 
 
 def left_out(chosen: str, others: Iterable[str]) -> str:
