@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.evaluate.checks import check_trial
 from xb_muscle_ros.trials.bag_reading import TrialBag
 from xb_muscle_ros.trials.bags import find_bags, read_trial, write_trial
 from xb_muscle_ros.trials.completing import Known
@@ -417,6 +418,18 @@ def test_what_is_doubtful_in_a_bag_is_one_line(tmp_path: Path, change: Callable[
     (found,), _ = study(bag)
     (line,) = found.warnings
     assert words in line
+
+
+def test_phases_that_go_on_after_the_lengths_are_said(tmp_path: Path) -> None:
+    made = recording()
+    logged = [one for one in foreign.messages(made) if one.log_time_ns < 200_000_000]
+    (found,), notes = study(foreign.write_folder(tmp_path / "bag", [logged], foreign.facts_of(made)))
+    assert found.time_s[-1] == pytest.approx(0.198)
+    assert notes == [
+        "phases of the bag go on after its lengths end; of those the scores have a part, or none (1 trial)"
+    ]
+    check_trial(found, "bag")  # force is there as far as lengths are
+    assert not study(foreign.write_folder(tmp_path / "whole", [foreign.messages(made)], foreign.facts_of(made))).notes
 
 
 def test_an_empty_name_of_a_fibre_is_none(tmp_path: Path) -> None:

@@ -49,7 +49,7 @@ def _check_cover(trial: Trial, where: str) -> None:
         phase for phase in trial.facts.phases if "stretch" in phase.name or phase.name in ("shortening", "release")
     ]
     first = min((p.start_s for p in stretches), default=float(trial.time_s[0]))
-    last = max((p.end_s for p in stretches), default=float(trial.time_s[-1]))
+    last = min(max((p.end_s for p in stretches), default=np.inf), float(trial.time_s[-1]))
     step = float(np.max(np.diff(trial.force_time_s), initial=0.0))
     usual = float(np.median(np.diff(trial.force_time_s)))
     begin, end = float(trial.force_time_s[0]), float(trial.force_time_s[-1])

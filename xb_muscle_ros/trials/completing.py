@@ -18,6 +18,7 @@ from xb_muscle_ros.trials.trial import Array, Trial
 _PCA_DIGITS = 6
 CONDITIONING_FOUND = "amplitude and recovery found from length"
 _PHASES = "phases found from length"
+_CUT = "phases of the bag go on after its lengths end; of those the scores have a part, or none"
 _OTHER_CLOCK = "phases of the bag lie at other times than its lengths and are left out"
 # A record moves where means of so many parts differ by this share of length, and by so many of their standard errors.
 _PARTS, _LEAST_MOVE, _ERRORS = 20, 3e-3, 8.0
@@ -82,6 +83,8 @@ def complete(reading: Reading, known: Known) -> tuple[Trial, tuple[str, ...]]:
         unknown |= {"phases"}
         trial = replace(trial, facts=replace(trial.facts, phases=()))
         notes.append(_OTHER_CLOCK)
+    elif _cut(trial):
+        notes.append(_CUT)
     if "phases" in unknown:
         trial = _with_phases(trial, _length_for_phases(trial, unknown, known))
         hidden = [phase.name for phase in trial.facts.phases] == ["isometric"] and _moves(trial.length_m)
@@ -125,6 +128,13 @@ def _overlap(trial: Trial) -> bool:
     """Whether any phase lies within the lengths: phases of another clock do not."""
     begin_s, end_s = trial.time_s[0], trial.time_s[-1]
     return any(phase.start_s <= end_s and phase.end_s >= begin_s for phase in trial.facts.phases)
+
+
+def _cut(trial: Trial) -> bool:
+    """Whether phases end later than the lengths, by more than two samples."""
+    steps = np.diff(trial.time_s)
+    end_s = max((phase.end_s for phase in trial.facts.phases), default=-np.inf)
+    return bool(end_s > trial.time_s[-1] + 2.0 * (float(np.median(steps)) if steps.size else 0.0))
 
 
 def _moves(length_m: Array) -> bool:
