@@ -432,6 +432,16 @@ def test_phases_that_go_on_after_the_lengths_are_said(tmp_path: Path) -> None:
     assert not study(foreign.write_folder(tmp_path / "whole", [foreign.messages(made)], foreign.facts_of(made))).notes
 
 
+def test_what_holds_for_several_bags_is_one_line(tmp_path: Path) -> None:
+    made = recording()
+    for name, factor in (("a", 1.0), ("b", 0.98), ("c", 0.96), ("d", 0.94), ("e", 0.92)):
+        pushing = dataclasses.replace(made, force_n=-factor * made.force_n)
+        foreign.write_folder(tmp_path / "bags" / name, [foreign.messages(pushing)], foreign.facts_of(made))
+    (line,) = study(tmp_path / "bags").lines
+    assert line.startswith(f"bag {tmp_path / 'bags' / 'a'}: the median of measured force is -0.")
+    assert line.endswith("(likewise 4 more bags: b, c, d, ...)")
+
+
 def test_an_empty_name_of_a_fibre_is_none(tmp_path: Path) -> None:
     made = recording()
     facts = {**foreign.facts_of(made), "fibre": " "}

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable
 from xb_muscle_ros.scores.conditions import AMPLITUDES_L0, CONDITIONS, RECOVERIES_S
+from xb_muscle_ros.trials.alike import alike
 from xb_muscle_ros.trials.trial import Array
 
 MEASURED = "measured"
@@ -98,8 +99,8 @@ class Trials:
 
     @property
     def warnings(self) -> list[str]:
-        """All warnings, in order of the bags."""
-        return [line for index in sorted(self._warnings) for line in self._warnings[index]]
+        """All warnings, in order of the bags, those alike in one."""
+        return alike(line for index in sorted(self._warnings) for line in self._warnings[index])
 
     def why(self, index: int, of: str) -> dict[str, str]:
         """What a trial lacks that could be expected, measured or by a model, and why."""
