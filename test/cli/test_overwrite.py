@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from xb_muscle_ros.cli.main import main
 from xb_muscle_ros.diagnose import outcome
+from xb_muscle_ros.trials.bags import read_trial, write_trial
 
 FIBRE = ["--fiber", "18Dec2017a"]
 
@@ -126,3 +128,31 @@ def test_a_benchmark_is_made_anew_only_when_asked(tmp_path: Path, capsys: pytest
     assert "use --overwrite to replace it" in capsys.readouterr().err
     case = folder / "cases" / "case_0001"
     assert older_cases(folder) == [case / "bags" / "trial_1", case / "fibre.yaml", folder / "benchmark.json"]
+
+
+@pytest.mark.parametrize(("trial", "folder"), [("a/b", "a_b"), ("../../x", "_.._x"), ("", "_")])
+def test_a_trial_s_name_leads_out_of_no_folder(bags: Path, tmp_path: Path, trial: str, folder: str) -> None:
+    """Neither is a bag written beside the results, nor one removed that only has such a name."""
+    named = tmp_path / "named"
+    found = read_trial(Path(one(bags)))
+    write_trial(named, replace(found, facts=replace(found.facts, trial=trial)))
+    (tmp_path / "x").mkdir()
+    (tmp_path / "x" / "mine.mcap").write_text("mine")
+    before = inside(tmp_path)
+    for more in ([], ["--overwrite"]):
+        assert main(["replay", str(named), *FIBRE, "--out", str(tmp_path / "out"), *more]) == 0
+        new = {name for name in inside(tmp_path) - before if "/" not in name or not name.startswith("out/")}
+        assert new == {"out"}
+        assert [path.name for path in (tmp_path / "out" / "bags").iterdir()] == [folder]
+    assert (tmp_path / "x" / "mine.mcap").read_text() == "mine"
+
+
+def test_trials_that_would_become_one_bag_are_refused(
+    bags: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = read_trial(Path(one(bags)))
+    for name, trial in (("one", "a b"), ("two", "a/b")):
+        write_trial(tmp_path / "in" / name, replace(found, facts=replace(found.facts, trial=trial)))
+    assert main(["replay", str(tmp_path / "in"), *FIBRE, "--out", str(tmp_path / "out")]) == 2
+    assert "trials 'a b' and 'a/b' would both become bag" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import foreign_bags as foreign
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.evaluate.checks import check_trial
 from xb_muscle_ros.trials.bag_reading import TrialBag
 from xb_muscle_ros.trials.bags import find_bags, read_trial, write_trial
 from xb_muscle_ros.trials.completing import Known
@@ -95,17 +97,18 @@ def test_messages_of_others_are_skipped_and_counted(tmp_path: Path) -> None:
     bag = foreign.write_folder(tmp_path / "bag", [foreign.messages(made, {"knee": 1.1}, apart=True)], None)
     (found,), _ = study(bag)
     assert same_samples(found, made)
-    skipped = f"{n} of {2 * n} messages on /muscle/length are without 'ankle'; they are skipped, as the node does"
-    assert any(skipped in line for line in found.warnings)
+    (line,) = found.warnings
+    assert f"{n} of {2 * n} messages on /muscle/length, 1 of 2 messages on /muscle/calcium, {n} of" in line
+    assert "are without 'ankle'; they are skipped, as the node does" in line
 
 
 def test_facts_of_one_fibre_are_not_those_of_another(tmp_path: Path) -> None:
     made = recording()
-    facts = {**foreign.facts_of(made), "f0_n": "2.0", "reference_length_m": "1.25"}
+    facts = {**foreign.facts_of(made), "f0_n": "2.0", "reference_length_m": "1.125"}
     bag = foreign.write_folder(tmp_path / "bag", [foreign.messages(made, {"knee": 1.0})], facts)
     (own,), _ = study(bag)
     (other,), _ = study(bag, fibre="knee")
-    assert (own.facts.f0_n, own.facts.reference_length_m, own.facts.trial) == (2.0, 1.25, made.facts.trial)
+    assert (own.facts.f0_n, own.facts.reference_length_m, own.facts.trial) == (2.0, 1.125, made.facts.trial)
     assert (other.facts.f0_n, other.facts.reference_length_m) == (1.0, 1.0)
 
 
@@ -326,3 +329,121 @@ def test_handed_bags_are_imported(
     assert np.all(np.diff(trial.time_s) > 0.0)
     assert trial.facts.phases[1].start_s == pytest.approx(0.4, abs=2e-3)
     assert (warning in said.out + said.err) if warning else ("warning" not in said.out + said.err)
+
+
+def test_phases_of_another_clock_are_found_anew_and_said(tmp_path: Path) -> None:
+    made = recording()
+    logged = foreign.messages(made, begin_ns=foreign.EPOCH_NS)
+    (found,), notes = study(foreign.write_folder(tmp_path / "bag", [logged], foreign.facts_of(made)))
+    phases = {phase.name: phase for phase in found.facts.phases}
+    told = {phase.name: phase for phase in made.facts.phases}
+    assert phases["test_stretch"].start_s - found.time_s[0] == pytest.approx(told["test_stretch"].start_s, abs=2e-3)
+    assert notes[0] == "phases of the bag lie at other times than its lengths and are left out (1 trial)"
+    assert "phases found from length (1 trial)" in notes
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "words"),
+    [
+        (
+            "amplitude_l0",
+            "3.83",
+            "amplitude_l0 is 3.83; allowed is 0 to 0.5: amplitudes are fractions of L0, not percent",
+        ),
+        (
+            "recovery_s",
+            "100",
+            "recovery_s is 100 s, but the recovery at 0.3185 s has 0.1 s; correct the one that is wrong",
+        ),
+    ],
+)
+def test_facts_that_lengths_belie_are_refused_on_reading(tmp_path: Path, key: str, text: str, words: str) -> None:
+    made = recording()
+    bag = foreign.write_folder(tmp_path / "bag", [foreign.messages(made)], {**foreign.facts_of(made), key: text})
+    with pytest.raises(UserError, match=re.escape(words)):
+        study(bag)
+
+
+def test_a_pca_that_changing_calcium_never_has_is_refused(tmp_path: Path) -> None:
+    made = dataclasses.replace(recording(), calcium_time_s=np.array([0.0, 0.2]), calcium_um=np.array([0.01, 0.1]))
+    bag = foreign.write_folder(tmp_path / "bag", [foreign.messages(made)], foreign.facts_of(made))
+    with pytest.raises(
+        UserError, match=r"pCa is 6\.1, but calcium changes from 0\.01 to 0\.1 µM and never comes near 0"
+    ):
+        study(bag)
+    bare = foreign.write_folder(tmp_path / "bare", [foreign.messages(made)], None)
+    (found,), notes = study(bare)
+    assert found.facts.pca is None
+    assert "calcium changes, so there is no pCa (1 trial)" in notes
+
+
+def test_calcium_that_was_replaced_before_the_first_length_has_no_part(tmp_path: Path) -> None:
+    """A node's topic keeps the older message for late subscribers."""
+    made = recording()
+    later = dataclasses.replace(
+        made, time_s=made.time_s + 1.0, force_time_s=made.force_time_s + 1.0,
+        calcium_time_s=np.array([0.0, 0.5]), calcium_um=np.array([0.01, made.calcium_um[0]]),
+    )  # fmt: skip
+    (found,), notes = study(foreign.write_folder(tmp_path / "bag", [foreign.messages(later)], None))
+    assert (found.facts.pca, found.calcium_um.tolist()) == (6.1, made.calcium_um[:1].tolist())
+    assert "pCa taken from constant calcium (1 trial)" in notes
+
+
+def test_changes_of_length_are_no_lengths(tmp_path: Path) -> None:
+    made = recording()
+    changes = dataclasses.replace(made, length_m=made.length_m - 1.0)
+    bag = foreign.write_folder(tmp_path / "bag", [foreign.messages(changes)], None)
+    with pytest.raises(UserError, match=r"before the first stretch is 0 m and cannot be L0; .*--length-is change"):
+        study(bag, Known(first_isometric=True))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda t: dataclasses.replace(t, force_n=-t.force_n), "is its sign reversed, or its zero off?"),
+        (
+            lambda t: dataclasses.replace(t, calcium_um=1e-6 * t.calcium_um),
+            "though calcium is 7.94e-07 µM, at which fibres are relaxed: calcium is in µM",
+        ),
+        (
+            lambda t: dataclasses.replace(t, force_time_s=t.force_time_s[100:], force_n=t.force_n[100:]),
+            "measured force covers 0.2 to 0.602 s, lengths 0 to 0.602 s; nothing is compared elsewhere",
+        ),
+    ],
+)
+def test_what_is_doubtful_in_a_bag_is_one_line(tmp_path: Path, change: Callable[[Trial], Trial], words: str) -> None:
+    made = recording()
+    bare = ("phases", "pca")
+    bag = foreign.write_folder(tmp_path / "bag", [foreign.messages(change(made))], foreign.facts_of(made, bare))
+    (found,), _ = study(bag)
+    (line,) = found.warnings
+    assert words in line
+
+
+def test_phases_that_go_on_after_the_lengths_are_said(tmp_path: Path) -> None:
+    made = recording()
+    logged = [one for one in foreign.messages(made) if one.log_time_ns < 200_000_000]
+    (found,), notes = study(foreign.write_folder(tmp_path / "bag", [logged], foreign.facts_of(made)))
+    assert found.time_s[-1] == pytest.approx(0.198)
+    assert notes == [
+        "phases of the bag go on after its lengths end; of those the scores have a part, or none (1 trial)"
+    ]
+    check_trial(found, "bag")  # force is there as far as lengths are
+    assert not study(foreign.write_folder(tmp_path / "whole", [foreign.messages(made)], foreign.facts_of(made))).notes
+
+
+def test_what_holds_for_several_bags_is_one_line(tmp_path: Path) -> None:
+    made = recording()
+    for name, factor in (("a", 1.0), ("b", 0.98), ("c", 0.96), ("d", 0.94), ("e", 0.92)):
+        pushing = dataclasses.replace(made, force_n=-factor * made.force_n)
+        foreign.write_folder(tmp_path / "bags" / name, [foreign.messages(pushing)], foreign.facts_of(made))
+    (line,) = study(tmp_path / "bags").lines
+    assert line.startswith(f"bag {tmp_path / 'bags' / 'a'}: the median of measured force is -0.")
+    assert line.endswith("(likewise 4 more bags: b, c, d, ...)")
+
+
+def test_an_empty_name_of_a_fibre_is_none(tmp_path: Path) -> None:
+    made = recording()
+    facts = {**foreign.facts_of(made), "fibre": " "}
+    (found,), _ = study(foreign.write_folder(tmp_path / "bag", [foreign.messages(made)], facts))
+    assert (found.facts.fibre, found.warnings) == ("ankle", ())

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable
 from xb_muscle_ros.replay.offline import one_for_all
 from xb_muscle_ros.scores.conditions import AMPLITUDES_L0, CONDITIONS, RECOVERIES_S
+from xb_muscle_ros.trials.alike import alike
 from xb_muscle_ros.trials.trial import Array
 
 MEASURED = "measured"
@@ -102,8 +103,8 @@ class Trials:
 
     @property
     def warnings(self) -> list[str]:
-        """All warnings, in order of the bags; then one for each model that pushes where a muscle would be slack."""
-        lines = [line for index in sorted(self._warnings) for line in self._warnings[index]]
+        """All warnings in order of the bags, those alike in one; then one for each model that pushes."""
+        lines = alike(line for index in sorted(self._warnings) for line in self._warnings[index])
         for told in self._pushes.values():
             lines += one_for_all([told[index] for index in sorted(told) if self._code[index] >= 0])
         return lines

@@ -13,7 +13,7 @@ from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.offline import simulate_trial
 from xb_muscle_ros.replay.report import Record, add_relative_stiffness, record, table, write_json
-from xb_muscle_ros.trials.bag_files import remove_results
+from xb_muscle_ros.trials.bag_files import plain, remove_results
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.simulated import Simulated
 from xb_muscle_ros.trials.trial import Trial
@@ -93,18 +93,26 @@ def check_room(folder: Path, trials: Sequence[Trial], overwrite: bool) -> None:
     """Make sure that results may be written to a folder.
 
     Raises:
-        UserError: an older replay is there and may not be replaced, or a bag that is of none.
+        UserError: an older replay is there and may not be replaced, or a bag that is of none; two trials would become
+            one bag.
     """
     older = older_results(folder)
     refuse_older(older, overwrite)
+    taken: dict[Path, str] = {}
     for trial in trials:
         bag = _bag(folder, trial.facts.trial)
+        first = taken.setdefault(bag, trial.facts.trial)
+        if first != trial.facts.trial:
+            raise UserError(
+                f"trials '{first}' and '{trial.facts.trial}' would both become bag {bag}; replay them in separate runs"
+            )
         if bag.exists() and bag not in older:
             raise UserError(f"bag {bag} exists and is of no replay; choose another folder for --out")
 
 
 def _bag(folder: Path, trial: str) -> Path:
-    return folder / "bags" / trial
+    """A bag within the folder, whatever the trial is called."""
+    return folder / "bags" / (plain(trial).lstrip(".-") or "_")
 
 
 def write_results(folder: Path, trials: Sequence[Trial], results: Replay, live: Replay | None = None) -> list[Path]:

@@ -64,6 +64,11 @@ def check_replaceable(path: Path) -> None:
         )
 
 
+def plain(text: str) -> str:
+    """A text in characters every file system and shell takes: letters, digits, ``_``, ``-`` and ``.``."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "_", text)
+
+
 def remove_results(found: Iterable[Path]) -> None:
     """Remove files and bags of an older run; a folder that is not a bag alone stays, and so does what is in it.
 

@@ -44,7 +44,8 @@ class TrialBag:
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
         self._topics = Topics(open_bag(self.path))
-        self._data = self._topics.bag.custom_data or {}
+        data = self._topics.bag.custom_data or {}
+        self._data = {key: text for key, text in data.items() if text.strip() or key != "fibre"}  # no fibre is ''
         self.fibres = self._topics.names(ros_types.LENGTH)
         self.named: str | None = self._data.get("fibre")
 
@@ -75,6 +76,11 @@ class TrialBag:
         facts, unknown = self._facts(fibre)
         found = [each for each in (length, calcium, force) if each is not None]
         warnings += [line for each in found for line in each.warnings]
+        skipped = [each.skipped for each in found if each.skipped]
+        if skipped:
+            warnings.append(
+                f"bag {self.path}: {', '.join(skipped)} are without '{fibre}'; they are skipped, as the node does"
+            )
         names = sorted({each.name for each in found} - {facts.fibre})
         if names:
             warnings.append(f"bag {self.path}: messages name '{names[0]}', the trial facts name fibre '{facts.fibre}'")

@@ -28,12 +28,14 @@ class Samples(NamedTuple):
         values: shape (n, fields).
         name: under which the topic has them.
         warnings: a line for each thing that was lived with.
+        skipped: how many messages of the topic are without the name; empty for none.
     """
 
     time_s: Array
     values: Array
     name: str
     warnings: tuple[str, ...] = ()
+    skipped: str = ""
 
 
 class Decoded(NamedTuple):
@@ -128,13 +130,9 @@ class Topics:
             i, j = (int(k) for k in bad[0])
             where = self._at(topic, found.places[i], found.stamps[i])
             raise UserError(f"{where} has the value {values[i, j]}; allowed are finite numbers")
-        if found.others:
-            total = len(found.rows) + found.others
-            warnings.append(
-                f"bag {self.bag.path}: {found.others} of {total} messages on {topic} are without '{name}'; they are "
-                "skipped, as the node does"
-            )
-        return Samples(ros_types.to_s(found.stamps), values, name, tuple(warnings))
+        total = len(found.rows) + found.others
+        skipped = f"{found.others} of {total} messages on {topic}" if found.others else ""
+        return Samples(ros_types.to_s(found.stamps), values, name, tuple(warnings), skipped)
 
     def _kept(self, decoded: Decoded, row: Callable[[JointState, int, Stamps], list[float] | None]) -> _Kept:
         rows, places = [], []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.told_facts import check_told_facts
 from xb_muscle_ros.trials.trial import Array, Trial
 
 # Beyond these no fibre was measured; a record that goes there is in another unit.
@@ -15,8 +16,13 @@ CALCIUM_UM = 1e4
 USUAL_LENGTH_L0 = (0.5, 1.5)
 USUAL_PEAK_F0 = 3.0
 LEAST_PEAK_F0 = 3e-3
+# Fibres pull: a record that is lower for half of its time has its sign reversed, or its zero off.
+LEAST_MEDIAN_F0 = -0.1
 # At this free calcium a fibre is active, µM (pCa 6.3).
 ACTIVE_UM = 0.5
+# With less than this it is relaxed, µM (pCa 10), and pulls less than this over most of a trial, F0.
+RELAXED_UM = 1e-4
+_RELAXED_F0 = 0.1
 _PCA_APART = 0.05
 # Above this pCa a fibre is relaxed, whatever stands for its calcium.
 _RELAXED_PCA = 8.0
@@ -26,23 +32,27 @@ _GAP_STEPS, _GAP_S = 5.0, 0.01
 _ACROSS_L0 = 5e-3
 
 
-def check_values(trial: Trial, where: str, f0_is_told: bool = True) -> tuple[str, ...]:
+def check_values(trial: Trial, where: str, f0_is_told: bool = True, pca_is_told: bool = True) -> tuple[str, ...]:
     """Refuse a trial whose values make no sense; say what is unusual.
 
     Args:
         trial: with all facts.
         where: the bag, for messages.
         f0_is_told: whether bag, fibre file or user tell F0; else 1 N is taken for it.
+        pca_is_told: whether the bag tells pCa; else calcium alone does.
 
     Returns:
         Lines on lengths and forces that are far from L0 and F0, and on gaps.
 
     Raises:
         UserError: length, force or calcium are in another unit than their topic or fact has, pCa is contrary to
-            calcium, or samples are missing while length changes.
+            calcium, amplitude or recovery to length, or samples are missing while length changes.
     """
     _check_calcium(trial, where)
-    return (*_length(trial, where), *_force(trial, where, f0_is_told), *_gaps(trial, where))
+    lines = (*_length(trial, where), *_force(trial, where, f0_is_told), *_median_force(trial, where, pca_is_told))
+    lines += (*_gaps(trial, where), *_cover(trial, where))
+    check_told_facts(trial, where)
+    return lines
 
 
 def _length(trial: Trial, where: str) -> tuple[str, ...]:
@@ -78,12 +88,31 @@ def _force(trial: Trial, where: str, f0_is_told: bool) -> tuple[str, ...]:
     return (line,)
 
 
+def _median_force(trial: Trial, where: str, pca_is_told: bool) -> tuple[str, ...]:
+    """A line on a force of the wrong sign, or one that such calcium does not make."""
+    middle = float(np.median(trial.measured_f0)) if trial.force_n.size else 0.0
+    line = f"bag {where}: the median of measured force is {middle:.3g} F0"
+    if middle < LEAST_MEDIAN_F0:
+        return (f"{line}; usual is {LEAST_MEDIAN_F0:g} or more: is its sign reversed, or its zero off?",)
+    calcium = float(np.max(trial.calcium_um))
+    if middle > _RELAXED_F0 and calcium <= RELAXED_UM and not pca_is_told:
+        return (f"{line}, though calcium is {calcium:.3g} µM, at which fibres are relaxed: calcium is in µM",)
+    return ()
+
+
 def _check_calcium(trial: Trial, where: str) -> None:
     calcium, pca = trial.calcium_um, trial.facts.pca
     if np.min(calcium) < 0.0 or np.max(calcium) > CALCIUM_UM:
         worst = float(calcium[np.argmax(np.abs(calcium))])
         raise UserError(f"bag {where}: calcium is {worst:.3g} µM; allowed is 0 to {CALCIUM_UM:g}: calcium is in µM")
-    if np.ptp(calcium) > 0.0 or pca is None:
+    if pca is None:
+        return
+    if np.ptp(calcium) > 0.0:
+        if np.min(np.abs(np.log10(np.maximum(calcium, 1e-12)) - 6.0 + pca)) > _PCA_APART:
+            raise UserError(
+                f"bag {where}: pCa is {pca:g}, but calcium changes from {np.min(calcium):.4g} to {np.max(calcium):.4g} "
+                f"µM and never comes near {10.0 ** (6.0 - pca):.4g} µM; leave pCa out"
+            )
         return
     if pca >= _RELAXED_PCA and calcium[0] <= 10.0 ** (6.0 - _RELAXED_PCA):
         return
@@ -112,6 +141,20 @@ def _gaps(trial: Trial, where: str) -> tuple[str, ...]:
             )
         lines.append(f"{line}; {'a straight line is taken' if what == 'length' else 'nothing is compared there'}")
     return tuple(lines)
+
+
+def _cover(trial: Trial, where: str) -> tuple[str, ...]:
+    """A line on lengths before the first force, or after the last: nothing is compared there."""
+    force_s, time_s = trial.force_time_s, trial.time_s
+    if force_s.size < 2:
+        return ()
+    allowed_s = max(_GAP_STEPS * float(np.median(np.diff(force_s))), _GAP_S)
+    if max(force_s[0] - time_s[0], time_s[-1] - force_s[-1]) <= allowed_s:
+        return ()
+    return (
+        f"bag {where}: measured force covers {force_s[0]:.6g} to {force_s[-1]:.6g} s, lengths {time_s[0]:.6g} to "
+        f"{time_s[-1]:.6g} s; nothing is compared elsewhere",
+    )
 
 
 def _largest_gap(time_s: Array) -> tuple[float, float, float] | None:

@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.bag_reading import Reading
 from xb_muscle_ros.trials.phases import conditioning, detect_phases, initial_isometric
 from xb_muscle_ros.trials.trial import Array, Trial
@@ -17,6 +18,8 @@ from xb_muscle_ros.trials.trial import Array, Trial
 _PCA_DIGITS = 6
 CONDITIONING_FOUND = "amplitude and recovery found from length"
 _PHASES = "phases found from length"
+_CUT = "phases of the bag go on after its lengths end; of those the scores have a part, or none"
+_OTHER_CLOCK = "phases of the bag lie at other times than its lengths and are left out"
 # A record moves where means of so many parts differ by this share of length, and by so many of their standard errors.
 _PARTS, _LEAST_MOVE, _ERRORS = 20, 3e-3, 8.0
 
@@ -68,10 +71,20 @@ def complete(reading: Reading, known: Known) -> tuple[Trial, tuple[str, ...]]:
 
     L0 and F0 are the user's, else the bag's, else the fibre file's (1 m and 1 N, as for normalised data, where it says
     nothing else). Phases are found from length, amplitude and recovery from phases that are the paper's protocol, and
-    pCa from calcium that is constant.
+    pCa from calcium that is constant. Calcium that was replaced before the first length has no part in the trial.
+
+    Raises:
+        UserError: L0 is to be the length before the first stretch, and that is none.
     """
     trial, unknown = reading
     notes: list[str] = []
+    trial = _with_acting_calcium(trial)
+    if "phases" not in unknown and not _overlap(trial):
+        unknown |= {"phases"}
+        trial = replace(trial, facts=replace(trial.facts, phases=()))
+        notes.append(_OTHER_CLOCK)
+    elif _cut(trial):
+        notes.append(_CUT)
     if "phases" in unknown:
         trial = _with_phases(trial, _length_for_phases(trial, unknown, known))
         hidden = [phase.name for phase in trial.facts.phases] == ["isometric"] and _moves(trial.length_m)
@@ -90,6 +103,8 @@ def complete(reading: Reading, known: Known) -> tuple[Trial, tuple[str, ...]]:
         notes.append(CONDITIONING_FOUND)
     if found.pca != facts.pca:
         notes.append("pCa taken from constant calcium")
+    elif found.pca is None and np.ptp(trial.calcium_um) > 0.0:
+        notes.append("calcium changes, so there is no pCa")
     return replace(trial, facts=found), tuple(notes)
 
 
@@ -99,6 +114,27 @@ def pca_of(trial: Trial) -> float | None:
     if trial.facts.pca is not None or np.ptp(calcium) > 0.0 or calcium[0] <= 0.0:
         return trial.facts.pca
     return round(float(6.0 - np.log10(calcium[0])), _PCA_DIGITS)
+
+
+def _with_acting_calcium(trial: Trial) -> Trial:
+    """The trial without calcium that was replaced before the first length; a node's topic keeps such."""
+    first = max(int(np.searchsorted(trial.calcium_time_s, trial.time_s[0], side="right")) - 1, 0)
+    if not first:
+        return trial
+    return replace(trial, calcium_time_s=trial.calcium_time_s[first:], calcium_um=trial.calcium_um[first:])
+
+
+def _overlap(trial: Trial) -> bool:
+    """Whether any phase lies within the lengths: phases of another clock do not."""
+    begin_s, end_s = trial.time_s[0], trial.time_s[-1]
+    return any(phase.start_s <= end_s and phase.end_s >= begin_s for phase in trial.facts.phases)
+
+
+def _cut(trial: Trial) -> bool:
+    """Whether phases end later than the lengths, by more than two samples."""
+    steps = np.diff(trial.time_s)
+    end_s = max((phase.end_s for phase in trial.facts.phases), default=-np.inf)
+    return bool(end_s > trial.time_s[-1] + 2.0 * (float(np.median(steps)) if steps.size else 0.0))
 
 
 def _moves(length_m: Array) -> bool:
@@ -141,6 +177,11 @@ def _with_scales(trial: Trial, unknown: frozenset[str], known: Known) -> tuple[T
     if known.first_isometric:
         start = trial.length_m[initial_isometric(trial.time_s, trial.facts.phases)]
         l0 = float(np.mean(start if start.size else trial.length_m[:1]))
+        if l0 <= 0.0:
+            raise UserError(
+                f"trial {trial.facts.trial}: the length before the first stretch is {l0:.3g} m and cannot be L0; "
+                "lengths of a bag are absolute, not changes; import the bag with --length-is change"
+            )
         notes.append(f"L0 is the length {'before the first stretch' if start.size else 'of the first sample'}")
     elif known.reference_length_m is not None:
         l0 = known.reference_length_m

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.bag_files import METADATA, clear_leftovers, mcap_files
+from xb_muscle_ros.trials.bag_files import METADATA, clear_leftovers, mcap_files, plain
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.provenance import Provenance, provenance_of, recorded_provenance
 from xb_muscle_ros.trials.readers.assembly import trial_of
@@ -95,7 +94,7 @@ def bag_name(data_set: str, trial: str) -> str:
 
     A trial whose name is the data set's, or begins with it and ``_``, does not get it twice.
     """
-    first, name = (re.sub(r"[^A-Za-z0-9_.-]+", "_", text) for text in (data_set, trial))
+    first, name = plain(data_set), plain(trial)
     whole = name if name == first or name.startswith(f"{first}_") else f"{first}_{name}"
     return whole.lstrip(".-")
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.alike import alike
 from xb_muscle_ros.trials.bag_files import find_bags
 from xb_muscle_ros.trials.bag_reading import TrialBag
 from xb_muscle_ros.trials.checks import check_values
@@ -23,8 +24,8 @@ class Study(NamedTuple):
 
     @property
     def lines(self) -> list[str]:
-        """All there is to say to the user: the notes, then the trials' own warnings."""
-        return [*self.notes, *(line for trial in self.trials for line in trial.warnings)]
+        """All there is to say to the user: the notes, then the trials' own warnings, those alike in one."""
+        return [*self.notes, *alike(line for trial in self.trials for line in trial.warnings)]
 
 
 def read_study(paths: Iterable[str | Path], fibre: str, known: Known, only: str | None = None) -> Study:
@@ -70,7 +71,8 @@ def trial_of_bag(bag: TrialBag, fibre: str, known: Known, where: str) -> tuple[T
     reading = bag.reading(fibre)
     trial, notes = complete(reading, known)
     told = "f0_n" not in reading.unknown or known.f0_n is not None or known.file_f0_n != 1.0
-    return replace(trial, warnings=(*trial.warnings, *check_values(trial, where, told))), notes
+    lines = check_values(trial, where, told, "pca" not in reading.unknown)
+    return replace(trial, warnings=(*trial.warnings, *lines)), notes
 
 
 def left_out(chosen: str, others: Iterable[str]) -> str:
