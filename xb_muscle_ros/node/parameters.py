@@ -1,6 +1,6 @@
 """The node's own parameters, one row each, and the descriptors that ROS tools show."""
 
-# mypy: allow-untyped-calls
+# mypy: allow-untyped-calls, allow-subclassing-any
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter
 
 from xb_muscle_ros.errors import UserError, suggest
@@ -120,6 +121,11 @@ def is_foreign(name: str) -> bool:
     return name.startswith(_FOREIGN)
 
 
+def of_muscle_node(name: str) -> bool:
+    """Whether a name is one of the muscle node's, or of one of its fibres."""
+    return name in NODE_PARAMETERS or name in TEXTS or any(part in GROUPS for part in name.split(".")[:2])
+
+
 def check_node_parameter(name: str, value: object) -> Value:
     """`check_value` for a parameter of the node."""
     return check_value(name, NODE_PARAMETERS[name], value)
@@ -189,6 +195,13 @@ def meant_as_number(parameter: Any) -> Any:
         except ValueError:
             return parameter
     return parameter
+
+
+class NotDeclared(ParameterNotDeclaredException):
+    """The one exception that the parameter services turn into a refusal with its text as the reason."""
+
+    def __init__(self, error: UserError) -> None:
+        Exception.__init__(self, str(error))
 
 
 def unknown(name: str, declared: Iterable[str]) -> UserError:
