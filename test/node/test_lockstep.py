@@ -31,9 +31,7 @@ def test_calcium_far_ahead_and_missing_stamps_are_told(muscle: Muscle, notes: An
     lockstep = build(muscle, [], notes)
     for k in range(1025):
         lockstep.take_calcium(SECOND + k * SECOND // 100, 5.0)
-    with pytest.raises(
-        Refusal, match=r"waiting for calcium: .*the newest 1024 are kept and all are later"
-    ):
+    with pytest.raises(Refusal, match=r"waiting for calcium: .*the newest 1024 are kept and all are later"):
         lockstep.take_length(SECOND, 1.0, None)
     lockstep.reset()
     lockstep.take_calcium(0, 5.0)
