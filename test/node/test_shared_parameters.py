@@ -300,6 +300,16 @@ def test_a_shared_file_does_not_stop_the_node(start: Callable[..., Any], tmp_pat
     assert len(str(caught.value)) < 400
 
 
+def test_a_fibre_has_no_parameters_while_there_is_none(gate: Callable[..., Any]) -> None:
+    """A dump that is loaded into a node before it is configured is told what to do first."""
+    from rclpy.parameter import Parameter
+
+    node = gate(autostart=False, mode="lockstep", fiber_file="18Dec2017a")
+    for name, words in ((F, "is there while the node is configured; configure it first"), ("models.x", "not known")):
+        with pytest.raises(Exception, match=words):
+            node.set_parameters([Parameter(name, value=71.0)])
+
+
 def test_a_small_number_survives_dump_and_load(gate: Callable[..., Any]) -> None:
     """`ros2 param dump` writes 1e-05, and `ros2 param load` sends that back as text; other text is no number."""
     from rclpy.parameter import Parameter

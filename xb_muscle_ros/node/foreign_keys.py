@@ -34,7 +34,7 @@ def foreign_keys(names: Iterable[str], own: Collection[str], fibres: Collection[
         head, _, rest = name.partition(".")
         if name in own or (rest and (head in GROUPS or head in (fibres or ()))):
             continue
-        if _of_a_fibre(rest):
+        if of_a_fibre(rest):
             if fibres is None:
                 raise UserError(
                     f"parameter '{name}' is of one of many fibres, but this node has a single one without a name of "
@@ -49,7 +49,7 @@ def foreign_keys(names: Iterable[str], own: Collection[str], fibres: Collection[
     return found
 
 
-def _of_a_fibre(name: str) -> bool:
+def of_a_fibre(name: str) -> bool:
     """Whether a name is one that a fibre has: other nodes may have models and constants of their own."""
     group, _, inner = name.partition(".")
     model, _, leaf = inner.rpartition(".")

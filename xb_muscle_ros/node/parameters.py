@@ -15,7 +15,7 @@ from rclpy.parameter import Parameter
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked
-from xb_muscle_ros.node.foreign_keys import GROUPS
+from xb_muscle_ros.node.foreign_keys import GROUPS, of_a_fibre
 from xb_muscle_ros.node.watchdog import DECAY, HOLD, ISOMETRIC
 
 Value = bool | int | float | str | tuple[str, ...]
@@ -205,7 +205,13 @@ class NotDeclared(ParameterNotDeclaredException):
 
 
 def unknown(name: str, declared: Iterable[str]) -> UserError:
-    """What to say of a parameter nobody knows."""
+    """What to say of a parameter that is not there."""
+    declared = [*declared]
+    if of_a_fibre(name) and not any(of_a_fibre(n) or of_a_fibre(n.partition(".")[2]) for n in declared):
+        return UserError(
+            f"parameter '{name}' is there while the node is configured; configure it first, or give it in a parameter "
+            "file at the start"
+        )
     known = {n for n in declared if not is_foreign(n)} | set(NODE_PARAMETERS) | set(TEXTS)
     return UserError(f"parameter '{name}' is not known{suggest(name, known)}")
 
