@@ -99,8 +99,8 @@ class FibreDrive:
                     plant, model = self._plant, self._muscle.fibre.model
                     raise UserError(
                         f"{model}, {plant.muscles[i].name} at t = {plant.time_s:.3f} s, "
-                        f"angle {plant.angle_rad:.4f} rad: {error}; the body has moved further than its muscles reach: take a shorter --duration or a "
-                        "smaller --displacement"
+                        f"angle {plant.angle_rad:.4f} rad: {error}; the body has moved further than its muscles reach: "
+                        "take a shorter --duration or a smaller --displacement"
                     ) from error
         self._at_start = False
         force = np.array([self._muscle.outputs(state).force_f0 for state in self._states])
