@@ -142,3 +142,29 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main(["--version"])
     assert caught.value.code == 0
+
+
+def test_ctrl_c_inside_a_compiler_is_an_interruption(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It may come back as an error of the compiler's own; any other error stays one."""
+    from xb_muscle_ros.cli import main as module
+
+    def run(error: type[BaseException]) -> int:
+        class Parser:
+            def parse_args(self, argv: object) -> object:
+                return self
+
+            def run(self, arguments: object) -> int:
+                try:
+                    raise error
+                finally:
+                    raise RuntimeError("no compiled object yet")
+
+        monkeypatch.setattr(module, "parser", Parser)
+        return module.main([])
+
+    assert run(KeyboardInterrupt) == 130
+    assert capsys.readouterr().err == "xb_muscle: interrupted\n"
+    with pytest.raises(RuntimeError):
+        run(ValueError)

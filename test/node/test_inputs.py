@@ -107,7 +107,9 @@ def test_calcium_history_is_bounded_and_keeps_the_newest() -> None:
     for stamp in range(100_000):
         history.add(stamp, float(stamp))
     assert len(history._kept) <= 1024
+    assert history.full
     assert history.at(99_999) == 99_999.0
+    assert not history.full
 
 
 def test_counts_tell_what_is_new() -> None:

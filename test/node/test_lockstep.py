@@ -26,6 +26,20 @@ def build(muscle: Muscle, emitted: list[Any], notes: Any, simulated: bool = Fals
     return Lockstep(muscle, SCALE, lambda stamp, out, scale: emitted.append((stamp, out)), notes, lambda: simulated)
 
 
+def test_calcium_far_ahead_and_missing_stamps_are_told(muscle: Muscle, notes: Any) -> None:
+    """What is kept of calcium is bounded, and a refusal says so; without stamps no reset helps."""
+    lockstep = build(muscle, [], notes)
+    for k in range(1025):
+        lockstep.take_calcium(SECOND + k * SECOND // 100, 5.0)
+    with pytest.raises(Refusal, match=r"waiting for calcium: .*the newest 1024 are kept and all are later"):
+        lockstep.take_length(SECOND, 1.0, None)
+    lockstep.reset()
+    lockstep.take_calcium(0, 5.0)
+    lockstep.take_length(0, 1.0, None)
+    with pytest.raises(Refusal, match=r"not after the last: .*give each message a stamp of its own"):
+        lockstep.take_length(0, 1.0, None)
+
+
 class Violating(Muscle):
     """A fibre whose states leave their bounds in the step to 1.3 s."""
 

@@ -10,9 +10,11 @@ import pytest
 import yaml
 
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.models.fibre_file import load_fibre
+from xb_muscle_ros.models.fibre_file import find_fibre_file, load_fibre
 from xb_muscle_ros.node.configuration import configure, configure_many
 from xb_muscle_ros.node.foreign_keys import foreign_keys, ignored
+from xb_muscle_ros.node.parameter_files import silent_files
+from xb_muscle_ros.node.qos_overrides import told, without_effect
 
 OWN = ("rate_hz", "fiber_file", "timeout_s", "mode", "model", "fibre")
 F = "models.3state_coop.f"
@@ -22,6 +24,8 @@ def test_keys_of_other_nodes_are_told_from_slips() -> None:
     """Far from every name here: another node's."""
     names = ["rate_hz", F, "constants.f0_n", "use_gui", "controller_manager.update_rate", "robot_description", "rate"]
     assert foreign_keys(names, OWN) == names[3:]
+    others = ["vision.models.path", "vision.models.3d.mesh", "robot.constants.g", "arm.models", "arm.sources.a"]
+    assert foreign_keys(others, OWN) == others
     assert ignored(["a", "b"], "/muscle") == "parameters ignored, /muscle has none of these names: a, b"
     assert ignored([f"k{i}" for i in range(23)], "/m").endswith("k19 and 3 more")
 
@@ -75,6 +79,110 @@ def test_no_fibre_names_the_node_and_the_wildcard() -> None:
     """A parameter file for another name gives nothing."""
     with pytest.raises(UserError, match=r"no fibre is given to /leg/muscle; .* the key '/leg/muscle' or '/\*\*'"):
         configure("", {}, "/leg/muscle")
+
+
+def test_a_file_for_both_nodes_stops_neither() -> None:
+    """What is the muscle node's is no slip of the plant's, however alike, and the other way round."""
+    from xb_muscle_ros.node.parameters import NODE_PARAMETERS, TEXTS
+    from xb_muscle_ros.plant.plant_parameters import parameters, read
+
+    class Node:
+        """As much of a node as is asked for."""
+
+        def __init__(self, given: dict[str, object]) -> None:
+            self.given, self.said = given, list[str]()
+
+        def get_parameters_by_prefix(self, prefix: str) -> dict[str, Any]:
+            return {name: type("P", (), {"value": value}) for name, value in self.given.items()}
+
+        def get_logger(self) -> Any:
+            return type("L", (), {"warning": lambda _, text: self.said.append(text)})()
+
+        def get_fully_qualified_name(self) -> str:
+            return "/plant_node"
+
+        def undeclare_parameter(self, name: str) -> None:
+            pass
+
+        def declare_parameter(self, *_: object, **__: object) -> None:
+            pass
+
+    theirs: dict[str, object] = {"fibers": ["left"], "fiber_files": ["a"], F: 80.0, "left.constants.f0_n": 2.0}
+    node = Node({**theirs, "scene": "knee", "use_gui": True})
+    assert read(node)["scene"] == "knee"
+    assert len(node.said) == 1
+    assert all(name in node.said[0] for name in [*theirs, "use_gui"])
+    with pytest.raises(UserError, match="did you mean 'scene'"):
+        read(Node({"scenee": "knee"}))
+    own = {*NODE_PARAMETERS, *TEXTS}
+    of_plant = [name for name in parameters() if name not in own]
+    assert foreign_keys(of_plant, own) == of_plant
+
+
+def test_a_file_that_says_nothing_to_the_node_is_named(tmp_path: Path) -> None:
+    """ROS passes over it without a word."""
+    bodies = {
+        "yes": ["/**", "muscle_node", "/muscle_node", "/*", "/**/muscle_node"],
+        "no": ["muscel_node", "/leg/muscle_node", "/*/muscle_node", "plant_node"],
+    }
+    for kind, keys in bodies.items():
+        for key in keys:
+            path = tmp_path / "one.yaml"
+            path.write_text(yaml.safe_dump({key: {"ros__parameters": {"rate_hz": 500.0}}}), encoding="utf-8")
+            said = silent_files(["--ros-args", "--params-file", str(path)], "/muscle_node")
+            assert bool(said) == (kind == "no"), (key, said)
+            if said:
+                assert said[0].startswith(f"parameter file {path} has nothing for /muscle_node: its keys are /")
+                assert "'/muscle_node' or '/**'" in said[0]
+    path.write_text("leg:\n  muscle_node:\n    ros__parameters: {rate_hz: 500.0}\n", encoding="utf-8")
+    assert silent_files(["--params-file", str(path)], "/leg/muscle_node") == []
+    for empty in ("", "# nothing\n", "text\n", "/**:\n  ros__parameters: [1, 2]\n", "/**:\n  ros__parameters:\n"):
+        path.write_text(empty, encoding="utf-8")
+        (line,) = silent_files(["--params-file", str(path)], "/muscle_node")
+        assert "it has no 'ros__parameters' with names below" in line
+
+
+LENGTH = {"/muscle/length": "subscription", "/muscle/force": "publisher"}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("subscription.reliability", "bogus", ["is 'bogus'", "reliable or best_effort"]),
+        ("subscription.durability", 1, ["is 1", "transient_local or volatile"]),
+        ("subscription.depth", -3, ["is -3", "1 to 1000000"]),
+        ("subscription.depth", "big", ["is 'big'", "whole number"]),
+        ("subscription.depth", True, ["is True"]),
+        ("subscription.reliabilty", "reliable", ["history, depth, reliability, durability", "mean 'reliability'?"]),
+        ("subscription.deadline", 5, ["is not known", "history, depth"]),
+    ],
+)
+def test_wrong_quality_of_service_is_refused(name: str, value: object, words: list[str]) -> None:
+    """With the parameter, its value and what is allowed."""
+    with pytest.raises(UserError) as caught:
+        without_effect({f"qos_overrides./muscle/length.{name}": value}, LENGTH)
+    for word in (f"'qos_overrides./muscle/length.{name}'", *words):
+        assert word in str(caught.value)
+
+
+def test_quality_of_service_without_effect_is_named() -> None:
+    """Of another topic, or of a publisher that the node does not have."""
+    idle = ["/muscle/lenght.subscription.depth", "/muscle/length.publisher.depth", "muscle/length.subscription.depth"]
+    heard = ["/muscle/length.subscription.depth", "/muscle/force.publisher.depth", "/clock.subscription.depth"]
+    given = {f"qos_overrides.{name}": 5 for name in (*idle, *heard)}
+    found = without_effect(given, LENGTH)
+    assert found == [f"qos_overrides.{name}" for name in idle]
+    text = told(found, "/muscle_node", LENGTH)
+    assert all(name in text for name in (*idle, "/muscle/length.subscription", "/muscle/force.publisher"))
+
+
+def test_wrong_quality_of_service_fails_the_configuration(gate: Callable[..., Any]) -> None:
+    """In words of the parameter rather than of the middleware."""
+    from rclpy.lifecycle import TransitionCallbackReturn
+
+    node = gate(**{"fiber_file": "18Dec2017a", "qos_overrides./muscle/length.subscription.depth": -3})
+    assert node.trigger_configure() == TransitionCallbackReturn.FAILURE
+    assert "depth' is -3" in str(node.failure)
 
 
 def test_of_many_names_the_nearest_are_given() -> None:
@@ -148,6 +256,35 @@ def test_another_file_after_a_dump_is_the_other_fibre(gate: Callable[..., Any], 
         assert values["fibre"] == "13Dec2017a"
 
 
+def test_a_file_named_later_takes_the_place_of_a_fibre_that_came_as_parameters(gate: Callable[..., Any]) -> None:
+    """As with ``--params-file`` of a fibre file; what the user set stays, and without a file the first is back."""
+    from rclpy.parameter import Parameter
+
+    tree = yaml.safe_load(find_fibre_file("18Dec2017a").read_text(encoding="utf-8"))["/**"]["ros__parameters"]
+    node = gate(mode="lockstep", **_flat(tree))
+    node.trigger_configure()
+    assert node.set_parameters([Parameter(F, value=71.0)])[0].successful
+    for name, value in dump(node).items():
+        node.set_parameters([Parameter(name, value=value)])
+    for file in ("13Dec2017a", "", "13Dec2017a"):
+        node.trigger_cleanup()
+        assert node.set_parameters([Parameter("fiber_file", value=file)])[0].successful
+        node.trigger_configure()
+        fibre = load_fibre(file or "18Dec2017a")
+        values = dump(node)
+        assert (values["fibre"], values["source"]) == (fibre.name, fibre.source)
+        assert values["models.3state_coop.koop"] == fibre.values["koop"]
+        assert values[F] == 71.0
+
+
+def _flat(tree: dict[str, Any], above: str = "") -> dict[str, object]:
+    """A tree of parameters by names with dots."""
+    made: dict[str, object] = {}
+    for name, value in tree.items():
+        made |= _flat(value, f"{above}{name}.") if isinstance(value, dict) else {f"{above}{name}": value}
+    return made
+
+
 def test_a_shared_file_does_not_stop_the_node(start: Callable[..., Any], tmp_path: Path) -> None:
     """One warning names the keys that are not its own."""
     path = tmp_path / "all.yaml"
@@ -161,6 +298,16 @@ def test_a_shared_file_does_not_stop_the_node(start: Callable[..., Any], tmp_pat
     with pytest.raises(UserError, match="nearest of") as caught:
         driver.link.set_parameters({"zzzzz": 1.0})
     assert len(str(caught.value)) < 400
+
+
+def test_a_fibre_has_no_parameters_while_there_is_none(gate: Callable[..., Any]) -> None:
+    """A dump that is loaded into a node before it is configured is told what to do first."""
+    from rclpy.parameter import Parameter
+
+    node = gate(autostart=False, mode="lockstep", fiber_file="18Dec2017a")
+    for name, words in ((F, "is there while the node is configured; configure it first"), ("models.x", "not known")):
+        with pytest.raises(Exception, match=words):
+            node.set_parameters([Parameter(name, value=71.0)])
 
 
 def test_a_small_number_survives_dump_and_load(gate: Callable[..., Any]) -> None:

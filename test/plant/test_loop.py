@@ -144,6 +144,16 @@ def test_run_too_short_for_a_score() -> None:
     assert numbers(run_knee(None, False, 0.05))["first_swing_excursion_deg"] is None
 
 
+def test_a_body_that_falls_out_of_reach_ends_the_run_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Muscle, time and angle are named; a muscle of no length is no reason for a bare bound."""
+    plant = Plant("ankle", own_muscles=False)
+    drive = FibreDrive(plant, load_fibre("18Dec2017a"), plant.load_nm(), False)
+    drive.pull()
+    monkeypatch.setattr(plant, "length_change_l0", lambda: np.array([-1.01, 0.0]))
+    with pytest.raises(UserError, match=r"3state_coop, soleus at t = 0.000 s, angle .*-1.01 L0.*shorter --duration"):
+        drive.pull()
+
+
 def test_muscle_too_weak_to_stand() -> None:
     weak = changed(load_fibre("18Dec2017a", "hill_se"), {"act_max": 0.01}, "test")
     plant = Plant("ankle")

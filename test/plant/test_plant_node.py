@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from xb_muscle_ros.errors import UserError
+
 pytest.importorskip("mujoco", reason="needs the extra mujoco")
 
 PLANT = "xb_muscle_ros.plant.plant_node"
@@ -148,6 +150,15 @@ def test_bad_parameters_end_with_code_2_and_one_line(stage: Stage, given: dict[s
     assert stage.processes["plant"].wait() == 2
     assert words in stage.log("plant")
     assert stage.log("plant").count("\n") == 1
+
+
+def test_arguments_that_are_not_of_ros_are_refused() -> None:
+    """Both nodes; without --ros-args a parameter would be passed over."""
+    from xb_muscle_ros.node.arguments import begin
+
+    for arguments in (["extra"], ["--", "x"]):
+        with pytest.raises(UserError, match=f"argument '{arguments[0]}' is not known; ROS arguments come after"):
+            begin("plant_node", arguments)
 
 
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])

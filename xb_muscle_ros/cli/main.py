@@ -43,9 +43,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     except UserError as error:
         print(f"xb_muscle: error: {error}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
+    except BaseException as error:
+        if not _is_interruption(error):
+            raise
         print("xb_muscle: interrupted", file=sys.stderr)
         return 130
+
+
+def _is_interruption(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an error: a compiler that is disturbed ends with an error of its own."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def console() -> None:

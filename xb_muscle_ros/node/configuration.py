@@ -163,6 +163,36 @@ def _of_file_alone(base: Mapping[str, object], fibre: Fibre) -> Mapping[str, obj
         return base
 
 
+def declared(values: Mapping[str, Mapping[str, object]]) -> Mapping[str, object]:
+    """Parameters to show: all of one fibre; of many only those that differ, and only of the set in use.
+
+    Args:
+        values: by prefix (see `said_by_files`), then by flat ROS name.
+    """
+    if "" in values:
+        return values[""]
+    first = next(iter(values.values()))
+    shown: dict[str, object] = {name: first[name] for name in ("model", "method")}
+    for prefix, of_one in values.items():
+        for name, value in of_one.items():
+            if name == "source" or name.startswith(("models.", "constants.")):
+                shown[f"{prefix}{name}"] = value
+    return shown
+
+
+def on_top(given: Mapping[str, object], came: Mapping[str, object], named: bool) -> dict[str, object]:
+    """What counts of given parameters.
+
+    Args:
+        given: by flat ROS name.
+        came: those of a whole fibre that the node started with in place of a file.
+        named: whether a file is named now; it then stands in the place of what came, where nobody set that otherwise.
+    """
+    if not named:
+        return {**came, **given}
+    return {name: value for name, value in given.items() if name not in came or came[name] != value}
+
+
 def said_by_files(given: Mapping[str, object], of_file: Mapping[str, Mapping[str, object]]) -> list[str]:
     """Names of given parameters that fibres' files say the same of.
 

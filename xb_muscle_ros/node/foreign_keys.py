@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Collection, Iterable
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS
 
 # First parts of parameter names that no fibre can have for its name.
 GROUPS = ("models", "constants", "sources")
@@ -33,7 +34,7 @@ def foreign_keys(names: Iterable[str], own: Collection[str], fibres: Collection[
         head, _, rest = name.partition(".")
         if name in own or (rest and (head in GROUPS or head in (fibres or ()))):
             continue
-        if rest and rest.partition(".")[0] in GROUPS:
+        if of_a_fibre(rest):
             if fibres is None:
                 raise UserError(
                     f"parameter '{name}' is of one of many fibres, but this node has a single one without a name of "
@@ -48,6 +49,13 @@ def foreign_keys(names: Iterable[str], own: Collection[str], fibres: Collection[
     return found
 
 
+def of_a_fibre(name: str) -> bool:
+    """Whether a name is one that a fibre has: other nodes may have models and constants of their own."""
+    group, _, inner = name.partition(".")
+    model, _, leaf = inner.rpartition(".")
+    return (group == "constants" and inner in CONSTANTS) or (group == "models" and bool(model) and leaf in PARAMETERS)
+
+
 def _near(word: str, known: Iterable[str]) -> str:
     """The known name that a word looks like; empty where it looks like none."""
     by_small = {name.lower(): name for name in known}
@@ -57,6 +65,11 @@ def _near(word: str, known: Iterable[str]) -> str:
 
 def ignored(names: Collection[str], node: str) -> str:
     """What to say of the keys of other nodes."""
+    return f"parameters ignored, {node} has none of these names: {shortened(names)}"
+
+
+def shortened(names: Collection[str]) -> str:
+    """Names in one line; of very many the first."""
     shown = [*names][:_NAMES_SHOWN]
     more = f" and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
-    return f"parameters ignored, {node} has none of these names: {', '.join(shown)}{more}"
+    return f"{', '.join(shown)}{more}"

@@ -25,8 +25,9 @@ class Namesakes:
         if found > 1:
             self._looks = 0
             self._node.get_logger().warning(
-                f"{found} nodes are called {self._node.get_fully_qualified_name()}: services and parameters reach any "
-                "of them, and all answer to the same topics; end the others, or start this one with "
+                f"{found} nodes are called {self._node.get_fully_qualified_name()} (one that was killed counts for up "
+                "to 20 s more): services and parameters reach any of them, and all answer to the same topics; end the "
+                "others, or start this one with "
                 "--ros-args -r __node:=NAME or -r __ns:=/NAMESPACE"
             )
 

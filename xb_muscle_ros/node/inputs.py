@@ -17,7 +17,8 @@ LONGEST_GAP_S = 3600.0
 # Messages that overtake each other do so by milliseconds; a bag that starts again goes back by its whole length.
 BACK_S = 0.1
 
-_CALCIUM_KEPT = 1024
+# Samples of calcium ahead of length.
+CALCIUM_KEPT = 1024
 
 
 class Refusal(Exception):
@@ -144,9 +145,11 @@ def after(stamp: int, last: int | None, what: str) -> int:
     if last is None:
         return stamp
     if stamp <= last:
+        # Nobody's clock shows zero twice: the sender leaves stamps out.
+        remedy = "call ~/reset to start again" if stamp else "give each message a stamp of its own"
         raise Refusal(
             "stamp not after the last",
-            f"{what} at {stamp * 1e-9:.9f} s came after {last * 1e-9:.9f} s; call ~/reset to start again",
+            f"{what} at {stamp * 1e-9:.9f} s came after {last * 1e-9:.9f} s; {remedy}",
         )
     if stamp - last > LONGEST_GAP_S * 1e9:
         raise Refusal(
@@ -166,12 +169,17 @@ class CalciumHistory:
     """Calcium by stamp, held until the next one; keeps only what a later question can need."""
 
     def __init__(self) -> None:
-        self._kept: deque[tuple[int, float]] = deque(maxlen=_CALCIUM_KEPT)
+        self._kept: deque[tuple[int, float]] = deque(maxlen=CALCIUM_KEPT)
 
     @property
     def last_stamp(self) -> int | None:
         """Stamp of the newest value, ns."""
         return self._kept[-1][0] if self._kept else None
+
+    @property
+    def full(self) -> bool:
+        """Whether the oldest values may have been given up for newer ones."""
+        return len(self._kept) == CALCIUM_KEPT
 
     def add(self, stamp: int, calcium_um: float) -> None:
         """Append a value (µM) that holds from `stamp` (ns) on; stamps ascend."""

@@ -7,12 +7,13 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.qos import QoSDurabilityPolicy, QoSPolicyKind, QoSProfile, QoSReliabilityPolicy
+from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.node.arrivals import Arrivals
 from xb_muscle_ros.node.latched import Latched
+from xb_muscle_ros.node.qos_overrides import POLICIES
 
 
 class Inlet(Protocol):
@@ -108,5 +109,4 @@ def _qos(mode: str) -> QoSProfile:
 
 def overridable() -> dict[str, Any]:
     """What a parameter file may change of a publisher or subscription, as arguments for its making."""
-    kinds = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
-    return {"qos_overriding_options": QoSOverridingOptions(kinds)}
+    return {"qos_overriding_options": QoSOverridingOptions(POLICIES)}

@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import re
 import signal
 import sys
 from collections.abc import Sequence
@@ -60,42 +59,37 @@ def _main(argv: Sequence[str] | None) -> int:
 
 def _run(arguments: list[str], stop: _Stop) -> None:
     try:
-        import rclpy
-        from rclpy.signals import SignalHandlerOptions
-        from rclpy.utilities import remove_ros_args, try_shutdown
+        from rclpy.utilities import try_shutdown
+
+        from xb_muscle_ros.node.arguments import begin
     except ImportError as error:
         raise UserError(f"ROS 2 cannot be imported ({error}); source a ROS 2 Jazzy, or run scripts/setup") from error
     if "-h" in arguments or "--help" in arguments:
         print(USAGE)
         return
+    begin("muscle_node", arguments)
     try:
-        # The first entry stands for the program.
-        rest = remove_ros_args(["muscle_node", *arguments])[1:]
-        if rest:
-            raise UserError(f"argument '{rest[0]}' is not known; ROS arguments come after --ros-args (see --help)")
-        rclpy.init(args=["muscle_node", *arguments], signal_handler_options=SignalHandlerOptions.NO)
-    except UserError:
-        raise
-    except Exception as error:
-        raise UserError(f"ROS arguments cannot be used: {_first_words(error)}{_hint(arguments, str(error))}") from error
-    try:
-        _spin(stop)
+        _spin(stop, arguments)
     finally:
         try_shutdown()
 
 
-def _spin(stop: _Stop) -> None:
+def _spin(stop: _Stop, arguments: Sequence[str]) -> None:
+    from xb_muscle_ros.node.arguments import first_words
     from xb_muscle_ros.node.executor import make_executor
     from xb_muscle_ros.node.muscle_node import MuscleNode
+    from xb_muscle_ros.node.parameter_files import silent_files
 
     try:
         node = MuscleNode()
     except UserError:
         raise
     except Exception as error:
-        raise UserError(f"the node cannot be created: {_first_words(error)}; check names and parameters") from error
+        raise UserError(f"the node cannot be created: {first_words(error)}; check names and parameters") from error
     try:
         node.autostart()
+        for line in silent_files(arguments, node.get_fully_qualified_name()):
+            node.get_logger().warning(line)
         executor = make_executor()
         executor.add_node(node)
         while not stop.asked and not node.finished:
@@ -106,21 +100,6 @@ def _spin(stop: _Stop) -> None:
     finally:
         node.close()
         node.destroy_node()
-
-
-def _first_words(error: Exception) -> str:
-    """Text of an error of ROS without the places in ROS' own source."""
-    text = " ".join(str(error).split())
-    return text.split(", at ")[0]
-
-
-def _hint(arguments: list[str], error: str) -> str:
-    if "params file" in error:
-        return "; such a file has the node's full name or '/**' at its top, below it 'ros__parameters', then the names"
-    # ROS' grammar of -p has no names with a part that starts with a digit; parameter files have.
-    if any(re.match(r"[^:]*\.\d[^:]*:=", argument) for argument in arguments):
-        return "; a name such as models.3state_coop.f can be given in a parameter file only, not with -p"
-    return "; see --help"
 
 
 if __name__ == "__main__":

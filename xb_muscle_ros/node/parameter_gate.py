@@ -9,12 +9,19 @@ from contextlib import contextmanager
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre, fibre_from_parameters
-from xb_muscle_ros.node.configuration import WHERE, Configured, configure, configure_many, said_by_files
+from xb_muscle_ros.node.configuration import (
+    WHERE,
+    Configured,
+    configure,
+    configure_many,
+    declared,
+    on_top,
+    said_by_files,
+)
 from xb_muscle_ros.node.foreign_keys import foreign_keys, ignored
 from xb_muscle_ros.node.parameters import (
     INACTIVE,
@@ -23,6 +30,7 @@ from xb_muscle_ros.node.parameters import (
     START,
     TEXTS,
     UNCONFIGURED,
+    NotDeclared,
     check_fibre_parameter,
     check_node_parameter,
     fibre_descriptor,
@@ -33,13 +41,7 @@ from xb_muscle_ros.node.parameters import (
     node_descriptor,
     unknown,
 )
-
-
-class _Unknown(ParameterNotDeclaredException):
-    """The one exception that the parameter services turn into a refusal with its text as the reason."""
-
-    def __init__(self, error: UserError) -> None:
-        Exception.__init__(self, str(error))
+from xb_muscle_ros.node.qos_overrides import look_at_overrides
 
 
 class ParameterGate:
@@ -77,11 +79,15 @@ class ParameterGate:
         for name in overrides:
             node.undeclare_parameter(name)
         self._declare_own(overrides)
+        self.error = self.error or look_at_overrides(node)
         for name, value in self._own_of(overrides).items():
             self._give(name, value)
         for name in TEXTS:
             if not node.has_parameter(name):
                 self._declare(name, "")
+        # A whole fibre that came as parameters is as good as a file, and yields to one that is named later.
+        whole = not (self.value("fiber_file") or self.many)
+        self._came: dict[str, object] = dict(self._given) if whole else {}
         node.add_pre_set_parameters_callback(self._before)
         node.add_on_set_parameters_callback(self._check)
         node.add_post_set_parameters_callback(self._apply)
@@ -108,38 +114,31 @@ class ParameterGate:
         self._values = {prefix: one.values for prefix, one in made.items()}
         self._of_file = {prefix: one.of_file for prefix, one in made.items()}
         self._leave_to_the_files()
+        shown = declared(self._values)
         with self._by_own_hand():
-            for name, value in self._declared().items():
+            for name, value in shown.items():
                 if self._node.has_parameter(name):
                     self._node.set_parameters([Parameter(name, value=value)])
                 else:
                     self._declare(name, value)
                     self._derived.append(name)
+            for name in {*self._came} - {*shown, *TEXTS}:
+                if self._node.has_parameter(name):
+                    self._node.undeclare_parameter(name)
         return list(self.fibres.values())
 
     def _made(self) -> Mapping[str, Configured]:
         file: str = self.value("fiber_file")
+        given = on_top(self._given, self._came, bool(file) or self.many)
         if not self.many:
-            return {"": configure(file, self._given, self._node.get_fully_qualified_name())}
+            return {"": configure(file, given, self._node.get_fully_qualified_name())}
         names, files = ([*filter(None, self.value(name))] for name in ("fibers", "fiber_files"))
         if bool(files) == bool(file):
             found = "both" if file else "none"
             raise UserError(f"many fibres need 'fiber_files', or 'fiber_file' for all of them, found {found}; give one")
-        made = configure_many(names, files or [file] * len(names), self._given, self._ignore, self._earlier)
+        made = configure_many(names, files or [file] * len(names), given, self._ignore, self._earlier)
         self._earlier |= {*made}
         return {f"{name}.": pair for name, pair in made.items()}
-
-    def _declared(self) -> dict[str, object]:
-        """Parameters by name and value; of many fibres only those that differ, and only of the set in use."""
-        if "" in self._values:
-            return self._values[""]
-        first = next(iter(self._values.values()))
-        shown: dict[str, object] = {name: first[name] for name in ("model", "method")}
-        for prefix, values in self._values.items():
-            for name, value in values.items():
-                if name == "source" or name.startswith(("models.", "constants.")):
-                    shown[f"{prefix}{name}"] = value
-        return shown
 
     def release(self) -> None:
         """Back to what was given; parameters that came from a file are no longer declared."""
@@ -214,7 +213,7 @@ class ParameterGate:
         for parameter in parameters:
             name = parameter.name
             if not self._node.has_parameter(name):
-                raise _Unknown(unknown(name, self._node.get_parameters_by_prefix("")))
+                raise NotDeclared(unknown(name, self._node.get_parameters_by_prefix("")))
             if self._node.get_parameter(name).type_ == Parameter.Type.DOUBLE:
                 parameter = meant_as_number(parameter)
             made.append(parameter)

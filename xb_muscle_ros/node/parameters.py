@@ -1,6 +1,6 @@
 """The node's own parameters, one row each, and the descriptors that ROS tools show."""
 
-# mypy: allow-untyped-calls
+# mypy: allow-untyped-calls, allow-subclassing-any
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked
-from xb_muscle_ros.node.foreign_keys import GROUPS
+from xb_muscle_ros.node.foreign_keys import GROUPS, of_a_fibre
 from xb_muscle_ros.node.watchdog import DECAY, HOLD, ISOMETRIC
 
 Value = bool | int | float | str | tuple[str, ...]
@@ -120,6 +121,11 @@ def is_foreign(name: str) -> bool:
     return name.startswith(_FOREIGN)
 
 
+def of_muscle_node(name: str) -> bool:
+    """Whether a name is one of the muscle node's, or of one of its fibres."""
+    return name in NODE_PARAMETERS or name in TEXTS or any(part in GROUPS for part in name.split(".")[:2])
+
+
 def check_node_parameter(name: str, value: object) -> Value:
     """`check_value` for a parameter of the node."""
     return check_value(name, NODE_PARAMETERS[name], value)
@@ -191,8 +197,21 @@ def meant_as_number(parameter: Any) -> Any:
     return parameter
 
 
+class NotDeclared(ParameterNotDeclaredException):
+    """The one exception that the parameter services turn into a refusal with its text as the reason."""
+
+    def __init__(self, error: UserError) -> None:
+        Exception.__init__(self, str(error))
+
+
 def unknown(name: str, declared: Iterable[str]) -> UserError:
-    """What to say of a parameter nobody knows."""
+    """What to say of a parameter that is not there."""
+    declared = [*declared]
+    if of_a_fibre(name) and not any(of_a_fibre(n) or of_a_fibre(n.partition(".")[2]) for n in declared):
+        return UserError(
+            f"parameter '{name}' is there while the node is configured; configure it first, or give it in a parameter "
+            "file at the start"
+        )
     known = {n for n in declared if not is_foreign(n)} | set(NODE_PARAMETERS) | set(TEXTS)
     return UserError(f"parameter '{name}' is not known{suggest(name, known)}")
 

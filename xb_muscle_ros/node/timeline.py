@@ -11,6 +11,7 @@ import numpy.typing as npt
 from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.node.inputs import (
+    CALCIUM_KEPT,
     VELOCITY_L0_PER_S,
     CalciumHistory,
     Counts,
@@ -147,7 +148,10 @@ class Timeline:
         asked = stamp if last is None else last
         calcium = run.calcium.at(asked)
         if calcium is None:
-            raise Refusal("waiting for calcium", f"none with a stamp up to {asked * 1e-9:.9f} s; publish it first")
+            remedy = "publish it first"
+            if run.calcium.full:
+                remedy = f"the newest {CALCIUM_KEPT} are kept and all are later; publish less of it ahead of length"
+            raise Refusal("waiting for calcium", f"none with a stamp up to {asked * 1e-9:.9f} s; {remedy}")
         if last is None:
             return Plan(stamp, asked, change, calcium, None, 0.0)
         dt_s = (stamp - last) / 1e9

@@ -92,8 +92,16 @@ class FibreDrive:
         lengths = self._plant.length_change_l0()
         if not self._at_start:
             for i, length in enumerate(lengths.tolist()):
-                self._fibre_l0[i] = self._balanced(i, length) if self._elastic else length
-                self._states[i] = self._stepped(i, self._fibre_l0[i])
+                try:
+                    self._fibre_l0[i] = self._balanced(i, length) if self._elastic else length
+                    self._states[i] = self._stepped(i, self._fibre_l0[i])
+                except UserError as error:
+                    plant, model = self._plant, self._muscle.fibre.model
+                    raise UserError(
+                        f"{model}, {plant.muscles[i].name} at t = {plant.time_s:.3f} s, "
+                        f"angle {plant.angle_rad:.4f} rad: {error}; the body has moved further than its muscles reach: "
+                        "take a shorter --duration or a smaller --displacement"
+                    ) from error
         self._at_start = False
         force = np.array([self._muscle.outputs(state).force_f0 for state in self._states])
         self._plant.apply(force)

@@ -270,15 +270,16 @@ def _main() -> int:
 def _run(stop: Callable[[], bool]) -> None:
     try:
         import rclpy
-        from rclpy.signals import SignalHandlerOptions
         from rclpy.utilities import try_shutdown
+
+        from xb_muscle_ros.node.arguments import begin, first_words
     except ImportError as error:
         raise UserError(f"ROS 2 cannot be imported ({error}); source a ROS 2 Jazzy, or run scripts/setup") from error
+    begin("plant_node", sys.argv[1:])
     try:
-        rclpy.init(args=["plant_node", *sys.argv[1:]], signal_handler_options=SignalHandlerOptions.NO)
         node = rclpy.create_node("plant_node", automatically_declare_parameters_from_overrides=True)
     except Exception as error:
-        raise UserError(f"the node cannot be created: {' '.join(str(error).split())}; see --help") from error
+        raise UserError(f"the node cannot be created: {first_words(error)}; see --help") from error
     try:
         plant = PlantNode(node, stop)
         try:

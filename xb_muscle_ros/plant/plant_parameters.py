@@ -35,12 +35,14 @@ def parameters() -> Mapping[str, Any]:
 def read(node: Any) -> dict[str, Any]:
     """Values of the parameters, checked and declared with their descriptors."""
     from xb_muscle_ros.node.foreign_keys import foreign_keys, ignored
-    from xb_muscle_ros.node.parameters import check_value, is_foreign, row_descriptor
+    from xb_muscle_ros.node.parameters import check_value, is_foreign, of_muscle_node, row_descriptor
 
     rows = parameters()
     given = {name: p.value for name, p in node.get_parameters_by_prefix("").items() if not is_foreign(name)}
     values: dict[str, Any] = {}
-    foreign = foreign_keys(given, rows)
+    # A file for both nodes has the muscle node's as well, some of which are spelt like some of these.
+    of_muscle = [name for name in given if name not in rows and of_muscle_node(name)]
+    foreign = [*foreign_keys([name for name in given if name not in of_muscle], rows), *of_muscle]
     if foreign:
         node.get_logger().warning(ignored(foreign, node.get_fully_qualified_name()))
     for name in given:
