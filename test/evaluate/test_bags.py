@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from xb_muscle_ros.evaluate import bags
+from xb_muscle_ros.evaluate import bags, pairs_of_bags
 from xb_muscle_ros.evaluate.more_scores import enhancement_pairs, force_pca_of_trials
 from xb_muscle_ros.evaluate.trials import Trials, duplicates, srs_table
 from xb_muscle_ros.trials.trial import Phase, Trial
@@ -225,7 +225,7 @@ def test_enhancement_of_a_made_pair(make: Maker, held: Callable[..., Trial]) -> 
     # The isometric trial at the final length, and the one before the stretch rather than the one after it.
     assert [shape["trial"] for shape in pair] == ["ramp", "iso_long"]
     shared = bags.tasks([paths[0]], None, None, None, measured_only=True)[0]
-    found = bags.evaluate_enhancement(bags.enhancement_task(*pair, shared))
+    found = pairs_of_bags.evaluate_enhancement(pairs_of_bags.enhancement_task(*pair, shared))
     assert found["at_s"] == pytest.approx(5.0)
     assert {key: found["measured"][key] for key in ("stretched_f0", "isometric_f0", "enhancement_f0", "relative")} == (
         pytest.approx({"stretched_f0": 1.0, "isometric_f0": 0.8, "enhancement_f0": 0.2, "relative": 0.25})
@@ -241,7 +241,7 @@ def test_no_enhancement_once_activation_has_ended(make: Maker, held: Callable[..
     trials = kept(found_in(*paths, measured_only=True))
     (pair,) = enhancement_pairs(trials)
     shared = bags.tasks([paths[0]], None, None, None, measured_only=True)[0]
-    assert bags.evaluate_enhancement(bags.enhancement_task(*pair, shared))["measured"] == {
+    assert pairs_of_bags.evaluate_enhancement(pairs_of_bags.enhancement_task(*pair, shared))["measured"] == {
         "why": "calcium has fallen, or a trial ended, by 3 s after the stretch"
     }
 
@@ -253,7 +253,7 @@ def test_clocks_are_set_by_activation(make: Maker, held: Callable[..., Trial]) -
     paths = [make(late), make(held(0.1, 1.0, "ramp", stretched_s=1.9))]
     (pair,) = enhancement_pairs(kept(found_in(*paths, measured_only=True)))
     shared = bags.tasks([paths[0]], None, None, None, measured_only=True)[0]
-    found = bags.evaluate_enhancement(bags.enhancement_task(*pair, shared))
+    found = pairs_of_bags.evaluate_enhancement(pairs_of_bags.enhancement_task(*pair, shared))
     assert found["measured"]["isometric_f0"] == pytest.approx(4.9 + 1.0)
 
 

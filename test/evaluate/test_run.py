@@ -17,7 +17,9 @@ from typing import Any
 import pytest
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.evaluate.run import JOURNAL, Request, draw_figures, evaluate, write, write_tables
+from xb_muscle_ros.evaluate.results import Request
+from xb_muscle_ros.evaluate.run import JOURNAL, evaluate
+from xb_muscle_ros.evaluate.writing import draw_figures, write, write_tables
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.offline import simulate_trial

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,11 +13,16 @@ import yaml
 from mcap.writer import CompressionType, Writer
 
 from xb_muscle_ros.trials import ros_types
+from xb_muscle_ros.trials.completing import Known
 from xb_muscle_ros.trials.custom_data import facts_to_custom_data
+from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.ros_types import CALCIUM, FORCE, LENGTH, MEASURED_FORCE, joint_state, to_ns
+from xb_muscle_ros.trials.study import Study, read_study
 from xb_muscle_ros.trials.trial import Array, Trial
 
 EPOCH_NS = 1_700_000_000_000_000_000
+# Facts that a bag of others has not.
+BARE = ("phases", "amplitude_l0", "recovery_s", "pca", "reference_length_m", "f0_n", "fibre", "trial", "source")
 
 
 class Logged(NamedTuple):
@@ -117,3 +123,20 @@ def _metadata(files: Sequence[str], custom_data: Mapping[str, str] | None) -> st
         "custom_data": None if custom_data is None else dict(custom_data),
     }
     return yaml.safe_dump({"rosbag2_bagfile_information": json.loads(json.dumps(information))})
+
+
+def recording(amplitude_l0: float = 0.0383, recovery_s: float = 0.1, rate_hz: float = 500.0) -> Trial:
+    """A trial of the paper's protocol whose force follows length."""
+    trial = StretchShortenStretch(amplitude_l0, recovery_s, lead_s=0.15).trial("ankle", 6.1, rate_hz)
+    return dataclasses.replace(trial, force_time_s=trial.time_s, force_n=0.5 + 5.0 * trial.length_change_l0)
+
+
+def study(bag: Path, known: Known | None = None, **options: str) -> Study:
+    """Read a bag as a command does; of fibre ``ankle`` where no other is asked for."""
+    return read_study([bag], options.pop("fibre", "ankle"), known or Known(), **options)
+
+
+def same_samples(found: Trial, made: Trial) -> bool:
+    """Whether two trials hold equal samples."""
+    names = ("time_s", "length_m", "calcium_um", "force_time_s", "force_n")
+    return all(np.array_equal(getattr(found, name), getattr(made, name)) for name in names)

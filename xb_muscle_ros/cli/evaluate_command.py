@@ -46,7 +46,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Evaluate, print the tables, write the files."""
     from xb_muscle_ros.errors import UserError
     from xb_muscle_ros.evaluate.report import comparison_table, force_table, readings_with_conditions, srs_table_text
-    from xb_muscle_ros.evaluate.run import Request, evaluate, older_results, write
+    from xb_muscle_ros.evaluate.results import Request
+    from xb_muscle_ros.evaluate.run import evaluate
+    from xb_muscle_ros.evaluate.writing import older_results, write
     from xb_muscle_ros.files import refuse_older
     from xb_muscle_ros.models.registry import METHODS, split_set
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -13,12 +12,11 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.evaluate.checks import check_trial
+from xb_muscle_ros.evaluate.fibre_cache import all_fibre_files, available_sets, digest_of, fibre_of_file, muscle_of
 from xb_muscle_ros.evaluate.sets import NoFibreFile, file_serving
-from xb_muscle_ros.models.fibre_file import Fibre, base_set, fibre_folders, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.offline import pushing, simulate_trial
 from xb_muscle_ros.scores.conditions import nominal
-from xb_muscle_ros.scores.enhancement import AFTER_S, Side, enhancement
 from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.scores.readout import read_off
 from xb_muscle_ros.scores.redevelopment import redevelopment, restretch_end, still_until
@@ -35,8 +33,6 @@ Found = dict[str, Any]
 # Where an isometric trial and a stretched one are at the same length.
 SAME_LENGTH_L0 = 0.01
 _LEAST_STRETCH_L0 = 0.01
-# Calcium that has not fallen below this share of its peak still holds the muscle active.
-_STILL_ACTIVE = 0.9
 
 
 def tasks(
@@ -65,7 +61,7 @@ def tasks(
     shared = {
         "fibres": files,
         # Names of files say nothing about what is in them, and results are kept by their task.
-        "fibre_files": _digest(fibres.values() if fibres is not None else _all_fibre_files()),
+        "fibre_files": digest_of(fibres.values() if fibres is not None else all_fibre_files()),
         "models": None if models is None else list(models),
         "method": method,
         "settle_s": settle_s,
@@ -74,7 +70,7 @@ def tasks(
         "trials_of": only,
     }
     # Workers may stand in another folder; messages name bags as the user did.
-    return [{"bag": str(bag), "path": str(bag.absolute()), "state": _file_state(bag), **shared} for bag in bags]
+    return [{"bag": str(bag), "path": str(bag.absolute()), "state": file_state(bag), **shared} for bag in bags]
 
 
 def tasks_of_fibres(task: Mapping[str, Any], found: Mapping[str, Any]) -> tuple[list[Task], str | None]:
@@ -92,7 +88,7 @@ def tasks_of_fibres(task: Mapping[str, Any], found: Mapping[str, Any]) -> tuple[
     elif task["measured_only"]:
         taken = fibres
     else:
-        known = {path.stem for path in _all_fibre_files()}
+        known = {path.stem for path in all_fibre_files()}
         taken = [name for name in fibres if name in known]
     taken = taken or fibres  # each is refused by its name
     others = [name for name in fibres if name not in taken]
@@ -116,7 +112,7 @@ def evaluate_bag(task: Mapping[str, Any]) -> Found:
         bag = TrialBag(Path(task["path"]))
         if len(bag.fibres) > 1 and "fibre" not in task:
             return {**found, "several": bag.fibres}
-        trial, notes = _trial(bag, task)
+        trial, notes = trial_of_task(bag, task)
         facts = _facts(trial)
         if CONDITIONING_FOUND in notes:
             facts["amplitude_l0"], facts["recovery_s"] = nominal(facts["amplitude_l0"], facts["recovery_s"])
@@ -132,8 +128,8 @@ def evaluate_bag(task: Mapping[str, Any]) -> Found:
         if task["measured_only"]:
             return found
         path = file_serving(task["fibres"], trial.facts.fibre)
-        for name in task["models"] or _available(str(path), task["fibre_files"]):
-            muscle = _muscle(str(path), name, task["method"], task["fibre_files"])
+        for name in task["models"] or available_sets(str(path), task["fibre_files"]):
+            muscle = muscle_of(str(path), name, task["method"], task["fibre_files"])
             if muscle is None:
                 found["missing"].append(name)
             else:
@@ -186,56 +182,7 @@ def _measured(trial: Trial) -> Found:
     return found
 
 
-def enhancement_task(stretched: Found, isometric: Found, shared: Task) -> Task:
-    """Task that compares an active stretch with the isometric trial at its final length.
-
-    Args:
-        stretched, isometric: what `evaluate_bag` found of the trials, its ``trial``.
-        shared: a task of `tasks`, for all that does not depend on the bag.
-    """
-    shared = {key: value for key, value in shared.items() if key not in ("bag", "path", "state")}
-    states = [_file_state(Path(each["path"])) for each in (stretched, isometric)]
-    return {
-        **shared,
-        "fibre": stretched["fibre"],
-        "stretched": stretched["path"],
-        "isometric": isometric["path"],
-        "state": states,
-        "after_s": AFTER_S,
-    }
-
-
-def evaluate_enhancement(task: Mapping[str, Any]) -> Found:
-    """Residual force enhancement of a pair of bags, measured and by each model; ``why`` where it cannot be had."""
-    stretched, isometric = (_trial(TrialBag(Path(task[name])), task)[0] for name in ("stretched", "isometric"))
-    end_s = _stretch(stretched)[1]
-    # Clocks are set by the begin of activation, where calcium tells it.
-    shift = _activated_s(isometric) - _activated_s(stretched)
-    at_s = end_s + task["after_s"]
-    found: Found = {"at_s": at_s, "models": {}}
-    active = _active_at(stretched, at_s) and _active_at(isometric, at_s + shift)
-
-    def compare(a: Side, b: Side) -> Found:
-        if not active:
-            return {"why": f"calcium has fallen, or a trial ended, by {task['after_s']:g} s after the stretch"}
-        return enhancement(a, b._replace(time_s=b.time_s - shift), at_s)._asdict()
-
-    found["measured"] = compare(
-        *(Side(trial.force_time_s, trial.measured_f0, force_noise(trial)) for trial in (stretched, isometric))
-    )
-    if task["measured_only"]:
-        return found
-    path = file_serving(task["fibres"], stretched.facts.fibre)
-    for name in task["models"] or _available(str(path), task["fibre_files"]):
-        muscle = _muscle(str(path), name, task["method"], task["fibre_files"])
-        if muscle is not None:
-            a, b = (simulate_trial(muscle, trial, settle_s=task["settle_s"]) for trial in (stretched, isometric))
-            f0 = stretched.facts.f0_n, isometric.facts.f0_n
-            found["models"][name] = compare(Side(a.time_s, a.force_n / f0[0]), Side(b.time_s, b.force_n / f0[1]))
-    return found
-
-
-def _trial(bag: TrialBag, task: Mapping[str, Any]) -> tuple[Trial, tuple[str, ...]]:
+def trial_of_task(bag: TrialBag, task: Mapping[str, Any]) -> tuple[Trial, tuple[str, ...]]:
     """The trial of a task, complete, and lines on facts that are not the bag's own."""
     fibre, only = task.get("fibre"), task["trials_of"]
     alone = len(bag.fibres) == 1
@@ -246,7 +193,7 @@ def _trial(bag: TrialBag, task: Mapping[str, Any]) -> tuple[Trial, tuple[str, ..
     known = Known(**task["known"])
     if not task["measured_only"]:
         path = file_serving(task["fibres"], told)
-        known = known.of_file(_fibre(str(path), task["fibre_files"]))
+        known = known.of_file(fibre_of_file(str(path), task["fibre_files"]))
     return trial_of_bag(bag, name, known, task["bag"] if "bag" in task else str(bag.path))
 
 
@@ -268,7 +215,7 @@ def _compared(trial: Trial, muscle: Muscle, name: str, settle_s: float | None) -
 def _facts(trial: Trial) -> Found:
     """What grouping and pairing of trials need to know."""
     facts = trial.facts
-    stretch = _stretch(trial)
+    stretch = stretch_of(trial)
     return {
         "fibre": facts.fibre,
         "trial": facts.trial,
@@ -283,7 +230,7 @@ def _facts(trial: Trial) -> Found:
     }
 
 
-def _stretch(trial: Trial) -> tuple[float | None, float]:
+def stretch_of(trial: Trial) -> tuple[float | None, float]:
     """Size (L0) and end (s) of the one stretch of a trial that has nothing else; size is None for other trials."""
     moving = [p for p in trial.facts.phases if "stretch" in p.name or p.name in ("shortening", "release")]
     if len(moving) != 1 or "stretch" not in moving[0].name:
@@ -293,54 +240,11 @@ def _stretch(trial: Trial) -> tuple[float | None, float]:
     return (size if size >= _LEAST_STRETCH_L0 else None), moving[0].end_s
 
 
-def _activated_s(trial: Trial) -> float:
-    """When calcium first rises to half its peak, s; 0 where it is constant."""
-    calcium = trial.calcium_um
-    if np.ptp(calcium) == 0.0:
-        return 0.0
-    return float(trial.calcium_time_s[int(np.argmax(calcium >= 0.5 * np.max(calcium)))])
-
-
-def _active_at(trial: Trial, at_s: float) -> bool:
-    now = int(np.searchsorted(trial.calcium_time_s, at_s, side="right")) - 1
-    return at_s <= trial.time_s[-1] and now >= 0 and trial.calcium_um[now] >= _STILL_ACTIVE * np.max(trial.calcium_um)
-
-
-@functools.lru_cache(maxsize=64)
-def _muscle(path: str, model: str, method: str | None, digest: str) -> Muscle | None:
-    """The fibre ready to step; None where its file has no set for the model."""
-    if not {model, base_set(model)} & set(_available(path, digest)):
-        return None
-    return Muscle(load_fibre(path, model, method))
-
-
-def _available(path: str, digest: str) -> tuple[str, ...]:
-    """Sets of a fibre file; kept for as long as no fibre file changes."""
-    return _fibre(path, digest).available_models
-
-
-@functools.lru_cache(maxsize=64)
-def _fibre(path: str, digest: str) -> Fibre:
-    """A fibre file with its own choice of model; kept for as long as no fibre file changes."""
-    return load_fibre(path)
-
-
-def _file_state(bag: Path) -> str:
+def file_state(bag: Path) -> str:
     """What changes when a bag does: sizes and times of its files."""
     files = [bag] if bag.is_file() else sorted([*bag.glob("*.mcap"), *bag.glob(METADATA)])
     stats = [(file.name, file.stat()) for file in files]
     return " ".join(f"{name}:{stat.st_size}:{stat.st_mtime_ns}" for name, stat in stats)
-
-
-def _all_fibre_files() -> list[Path]:
-    return sorted(file for folder in fibre_folders() for file in folder.glob("*.yaml"))
-
-
-def _digest(files: Any) -> str:
-    digest = hashlib.sha256()
-    for file in files:
-        digest.update(Path(file).read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def _content(trial: Trial) -> str:

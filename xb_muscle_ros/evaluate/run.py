@@ -1,10 +1,9 @@
-"""A whole evaluation: recordings, the paper's grid, or both; sections, tables, figures, files."""
+"""A whole evaluation: recordings, the paper's grid, or both."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,82 +11,23 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.evaluate import bags as bag_tasks
-from xb_muscle_ros.evaluate import grid, more_scores, sections
+from xb_muscle_ros.evaluate import grid, more_scores, pairs_of_bags, sections
 from xb_muscle_ros.evaluate.golden import GOLDEN, OURS, golden_sources
 from xb_muscle_ros.evaluate.paper import Source, compare, readings_table
-from xb_muscle_ros.evaluate.report import write_up
-from xb_muscle_ros.evaluate.sets import ModelSet, file_serving, gather, served_line, value_lines
+from xb_muscle_ros.evaluate.results import Request, Results
+from xb_muscle_ros.evaluate.sets import file_serving, gather, served_line, value_lines
 from xb_muscle_ros.evaluate.srs_scores import ALL_READINGS, READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, read_table, read_tables
-from xb_muscle_ros.evaluate.tables_text import write_csv
 from xb_muscle_ros.evaluate.trials import MEASURED, Trials, duplicates, srs_table
 from xb_muscle_ros.figures.evaluate_srs import NOTHING_TO_DRAW, drawable
-from xb_muscle_ros.files import matching, write_text
 from xb_muscle_ros.models.fibre_file import fibre_folders, find_fibre_file, load_fibre
 from xb_muscle_ros.scores.enhancement import AFTER_S
-from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.trials.bags import find_bags
-from xb_muscle_ros.trials.completing import Known, counted
+from xb_muscle_ros.trials.completing import counted
 from xb_muscle_ros.work import Options, run, stream
 
 JOURNAL = "evaluate.journal"
 _MAXIMAL_PCA = 4.5
-
-
-@dataclass(frozen=True)
-class Request:
-    """What to evaluate.
-
-    Attributes:
-        bags: bag folders, ``.mcap`` files or folders of bags; may be empty where `empirical` is given.
-        fibres: fibre files or names; empty: a bag's own, or all of the package's that were measured.
-        models: parameter sets; None for all that the fibre files have.
-        method: representation of strain; None for the fibre file's.
-        settle_s: isometric time before a trial, s; None until at rest.
-        measured_only: no models.
-        skip_bad: leave recordings that cannot be used out, in place of refusing all.
-        empirical: table of measured SRS; its presence asks for the paper's grid.
-        golden: the authors' released output.
-        out: folder for results; the journal lies there too.
-        work: where to compute.
-        known: what is known of L0 and F0 beside bags and fibre files.
-        only: take trials of this fibre and no other.
-    """
-
-    bags: tuple[str, ...]
-    fibres: tuple[str, ...]
-    models: tuple[str, ...] | None
-    method: str | None
-    settle_s: float | None
-    measured_only: bool
-    skip_bad: bool
-    empirical: Path | None
-    golden: Path | None
-    out: Path
-    work: Options
-    known: Known = field(default_factory=Known)
-    only: str | None = None
-
-
-@dataclass
-class Results:
-    """What an evaluation found.
-
-    Attributes:
-        sections: content of ``evaluate.json``.
-        warnings: lines for the user.
-        trials: of the recordings; None without.
-        models: parameter sets, simplest first.
-        tables: SRS of models on the same trials as `data`, by set.
-        data: measured SRS; None where the recordings have none.
-    """
-
-    sections: dict[str, Any]
-    warnings: list[str] = field(default_factory=list)
-    trials: Trials | None = None
-    models: list[ModelSet] = field(default_factory=list)
-    tables: dict[str, SrsTable] = field(default_factory=dict)
-    data: SrsTable | None = None
 
 
 def evaluate(request: Request, tell: Callable[[str], None] = lambda line: None) -> Results:
@@ -112,61 +52,6 @@ def evaluate(request: Request, tell: Callable[[str], None] = lambda line: None) 
     if results.data and results.tables and not drawable(results.data, results.tables, results.sections["srs"]):
         results.warnings.append(NOTHING_TO_DRAW)
     return results
-
-
-def older_results(out: Path) -> list[Path]:
-    """What an older evaluation left in a folder; not its journal, which holds what is computed already."""
-    tables = ("trials", "force_rmsd", "relative_srs", "srs_cells", "srs_rmsd")
-    figures = ("force_rmsd", "relative_srs", "srs_surfaces")
-    return matching(out, r"evaluate\.(json|md)", rf"({'|'.join(tables)})\.csv", rf"({'|'.join(figures)})\.(png|pdf)")
-
-
-def write(request: Request, results: Results) -> list[Path]:
-    """Write all files of the results in the place of an older evaluation's; returns what to look at."""
-    remove_results(older_results(request.out))
-    return [*write_tables(request.out, results), *draw_figures(request.out, results)]
-
-
-def write_tables(out: Path, results: Results) -> list[Path]:
-    """Write ``evaluate.json``, ``evaluate.md`` and the CSV files."""
-    found = results.sections
-    write_text(out / "evaluate.json", json.dumps(found, indent=1, allow_nan=False) + "\n")
-    write_text(out / "evaluate.md", write_up(found))
-    made = ["evaluate.json", "evaluate.md"]
-
-    def table(name: str, rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> None:
-        write_csv(out / name, rows, columns)
-        made.append(name)
-
-    if results.trials is not None:
-        table("trials.csv", sections.trial_rows(results.trials), sections.TRIAL_COLUMNS)
-    if "force_rmsd" in found and found["force_rmsd"]["overall"]:
-        table("force_rmsd.csv", sections.force_rows(found["force_rmsd"]), sections.FORCE_COLUMNS)
-    if results.data is not None:
-        table("relative_srs.csv", sections.relative_rows(results.tables, results.data), sections.RELATIVE_COLUMNS)
-        cells = {MEASURED: results.data, **results.tables}
-        table("srs_cells.csv", sections.cell_rows(cells), sections.CELL_COLUMNS)
-    if "paper" in found:
-        table("srs_rmsd.csv", found["paper"]["readings"], list(found["paper"]["readings"][0]))
-    return [out / name for name in made]
-
-
-def draw_figures(out: Path, results: Results) -> list[Path]:
-    """Draw what there is to draw; PNG, and PDF beside it."""
-    from xb_muscle_ros.figures.evaluate_force import draw_force
-    from xb_muscle_ros.figures.evaluate_srs import draw_srs
-    from xb_muscle_ros.figures.evaluate_surfaces import draw_surfaces
-
-    made = []
-    force = results.sections.get("force_rmsd", {})
-    if force.get("overall"):
-        made.append(out / "force_rmsd.png")
-        draw_force(made[-1], force)
-    if results.data is not None and results.tables:
-        profiles, surfaces = out / "relative_srs.png", out / "srs_surfaces.png"
-        made += [profiles] if draw_srs(profiles, results.data, results.tables, results.sections["srs"]) else []
-        made += [surfaces] if draw_surfaces(surfaces, results.data, results.tables) else []
-    return made
 
 
 def _work(request: Request, label: str) -> Options:
@@ -276,8 +161,8 @@ def _enhancement(request: Request, results: Results, shared: dict[str, Any]) -> 
     pairs = more_scores.enhancement_pairs(results.trials)
     if not pairs:
         return
-    made = [bag_tasks.enhancement_task(a, b, shared) for a, b in pairs]
-    found = run(bag_tasks.evaluate_enhancement, made, _work(request, "force enhancement"))
+    made = [pairs_of_bags.enhancement_task(a, b, shared) for a, b in pairs]
+    found = run(pairs_of_bags.evaluate_enhancement, made, _work(request, "force enhancement"))
     rows = more_scores.enhancement_rows(pairs, [dict(one) for one in found])
     results.sections["residual_force_enhancement"] += rows
     results.sections["enhancement_after_s"] = AFTER_S

@@ -46,7 +46,7 @@ def _of_trial(trial: Trial) -> TrialNoise:
     for tau_s in _TAUS_S:
         for share in _SHARES:
             correlation = share * np.exp(-lags / tau_s) + (1.0 - share) * (lags == 0.0)
-            # Variance of what is left of noise of variance 1.
+            # Variance of the residual of noise of variance 1.
             unit = np.einsum("ki,kij,kj->k", weights, correlation, weights)
             found.append(Memory(size / float(np.sqrt(np.median(unit))), share, tau_s))
     found.sort(key=lambda member: member.sd_f0)

@@ -1,7 +1,7 @@
 """Hum: lines in the spectrum of force, sharper than any autoregression.
 
 An autoregression that is to follow a strong line of the mains or of a motor loses sight of the slow noise beside it,
-which is what makes means uncertain. So lines are found, told apart, and their autocovariance A²/2 cos(2 pi f t) added
+which is what makes means uncertain. So lines are found and separated, and their autocovariance A²/2 cos(2 pi f t) added
 to that of the rest. A line that is sampled too slowly shows at another frequency; its autocovariance at the samples is
 the same.
 """
