@@ -180,7 +180,12 @@ def random_force(trials: list[Trial]) -> list[Trial]:
 
 
 def swapped_channels(trials: list[Trial]) -> list[Trial]:
-    return [replace(t, length_m=1.0 + 0.05 * t.force_n, force_n=t.length_m) for t in trials]
+    # Told of lengths that are none, amplitude and recovery would have the bag refused.
+    facts = [replace(t.facts, amplitude_l0=None, recovery_s=None) for t in trials]
+    return [
+        replace(t, facts=told, length_m=1.0 + 0.05 * t.force_n, force_n=t.length_m)
+        for t, told in zip(trials, facts, strict=True)
+    ]
 
 
 def shuffled_calcium(trials: list[Trial]) -> list[Trial]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from xb_muscle_ros.cli.main import main
+from xb_muscle_ros.errors import StateViolation
 from xb_muscle_ros.evaluate.sets import gather, value_lines
 from xb_muscle_ros.models.fibre_file import changed, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
@@ -53,3 +54,10 @@ def test_every_command_says_so(capsys: pytest.CaptureFixture[str], tmp_path: Pat
         == 2
     )
     assert "warning: strain bins of 3.3 power strokes are too wide" in capsys.readouterr().err
+
+
+def test_a_grid_that_moves_beyond_its_range_is_told_with_the_range() -> None:
+    fine = load_fibre("18Dec2017a", "3state_coop", "characteristics")
+    narrow = Muscle(changed(fine, {"strain_range": 3.0, "regrid": 0.0}, "test"))
+    with pytest.raises(StateViolation, match=r"state grid_shift became \S+ at .*; allowed is -2 to 2; "):
+        narrow.step(narrow.settle(0.0, 0.8), 0.2, 0.8, 1e-2)

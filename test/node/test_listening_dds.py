@@ -36,7 +36,7 @@ def message(time_s: float, position: float) -> Any:
 @pytest.fixture
 def before(domain: int, request: pytest.FixtureRequest) -> Iterator[Callable[..., Any]]:
     """Publish something in a namespace, then start a node there."""
-    from conftest import Driver
+    from node_driver import Driver
 
     from xb_muscle_ros.node.process import NodeProcess
 
@@ -113,7 +113,7 @@ def test_plain_publishers_are_heard_beside_one_that_keeps(before: Callable[..., 
 
 def test_overrides_of_one_topic_leave_the_other_alone(domain: int, tmp_path: Path) -> None:
     """Calcium transient local by a parameter file: lengths of a volatile publisher still come."""
-    from conftest import Driver
+    from node_driver import Driver
 
     from xb_muscle_ros.node.process import NodeProcess
 

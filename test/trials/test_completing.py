@@ -239,3 +239,22 @@ def test_phases_that_go_on_after_the_lengths_are_said(tmp_path: Path) -> None:
     assert not foreign.study(
         foreign.write_folder(tmp_path / "whole", [foreign.messages(made)], foreign.facts_of(made))
     ).notes
+
+
+@pytest.mark.parametrize(
+    ("samples", "forces", "words"), [(2, 2, "2 samples of length"), (9, 1, "1 samples of measured")]
+)
+def test_samples_that_nothing_can_be_compared_by_are_refused(
+    tmp_path: Path, samples: int, forces: int, words: str
+) -> None:
+    made = foreign.recording()
+    few = dataclasses.replace(
+        made,
+        time_s=made.time_s[:samples],
+        length_m=made.length_m[:samples],
+        force_time_s=made.force_time_s[:forces],
+        force_n=made.force_n[:forces],
+    )
+    bag = foreign.write_folder(tmp_path / "bag", [foreign.messages(few)], foreign.facts_of(few, ("phases",)))
+    with pytest.raises(UserError, match=f"there are {words}.*; needed are 3; leave the bag out"):
+        foreign.study(bag)

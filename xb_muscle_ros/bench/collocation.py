@@ -49,6 +49,7 @@ _FUNCTIONS = {
     "Decay": lambda z, k: ca.exp(-ca.fabs(k * z)),
     "Softplus": lambda z, k, decay: ca.fmax(z, 0) + ca.log1p(decay) / k,
     "Positive": lambda z: ca.fmax(z, 0),
+    "HyperbolicTangent": ca.tanh,
     "Deviation": lambda v: ca.sqrt((v + ca.sqrt(v**2 + 4e-12)) / 2),
 }
 

@@ -19,21 +19,23 @@ if TYPE_CHECKING:
 
 BINS = Parameter("bins", "1", "points of the strain grid", 8.0, 100000.0, 200.0, "van der Zee et al. 2026")
 RANGE = Parameter(
-    "strain_range", "power strokes", "the grid reaches from minus to plus this strain", 1.0, 200.0, 15.0,
+    "strain_range", "power strokes", "the grid reaches from minus to plus this strain", 1.5, 200.0, 15.0,
     "van der Zee et al. 2026",
 )  # fmt: skip
 REGRID = Parameter(
     "regrid", "1", "1: renumber bins that have moved by whole bins, so that no movement leaves the grid; 0: leave them",
     0.0, 1.0, 1.0, "this package",
 )  # fmt: skip
-SHIFT = State("grid_shift", "power strokes", "how far the grid has moved with the contractile element", -200.0, 200.0)
 
 
 @functools.lru_cache(maxsize=16)
-def _rows(bins: int, others: tuple[State, ...]) -> tuple[State, ...]:
+def _rows(bins: int, strain_range: float, others: tuple[State, ...]) -> tuple[State, ...]:
     """Rows of a grid's states; kept, because a thousand fibres share them."""
     of_bin = (State(f"n_{i}", "1/power stroke", "density of attached heads", 0.0, 1e4) for i in range(bins))
-    return (*of_bin, *others, SHIFT)
+    # A grid that has moved further no longer covers the strains where heads attach.
+    most = strain_range - 1.0
+    moved = "how far the grid has moved with the contractile element"
+    return (*of_bin, *others, State("grid_shift", "power strokes", moved, -most, most))
 
 
 class Grid(Representation):
@@ -53,7 +55,7 @@ class Grid(Representation):
 
     def state_rows(self, model: Composition, values: Mapping[str, float]) -> tuple[State, ...]:
         """Bins first, then the blocks' states, then the shift of the grid."""
-        return _rows(int(values["bins"]), model.states)
+        return _rows(int(values["bins"]), values["strain_range"], model.states)
 
     def module_text(self, model: Composition, smooth: bool) -> str:
         """Scalar parts as expressions, bins in loops."""

@@ -8,9 +8,6 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.completing import pca_of
 from xb_muscle_ros.trials.trial import Trial
 
-# An error of the comparison takes so many samples.
-_LEAST_SAMPLES = 3
-
 
 def check_trial(trial: Trial, where: str) -> None:
     """Refuse a trial that cannot be evaluated, though its values are those of a muscle (`trials.checks`).
@@ -25,11 +22,6 @@ def check_trial(trial: Trial, where: str) -> None:
     if trial.force_time_s.size == 0:
         raise UserError(
             f"bag {where}: there is no measured force on /muscle/measured_force; evaluate compares with measurements"
-        )
-    if trial.force_time_s.size < _LEAST_SAMPLES:
-        raise UserError(
-            f"bag {where}: there are {trial.force_time_s.size} samples of measured force; needed are {_LEAST_SAMPLES}; "
-            "leave the bag out"
         )
     _check_pca(trial, where)
     _check_cover(trial, where)

@@ -35,7 +35,7 @@ class Measured:
         self.link = link
         self.child = child
         self.reports: list[dict[str, str]] = []
-        self.arrived_s: list[float] = []
+        self.stamped_s: list[float] = []
         self.begun_s = 0.0
         self._diagnostics = link.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10)
 
@@ -53,14 +53,15 @@ class Measured:
     def begin(self) -> None:
         """Reset the node; its figures count from here."""
         self.link.reset()
-        self.begun_s = time.monotonic()
+        self.begun_s = time.time()
         self.reports.clear()
-        self.arrived_s.clear()
+        self.stamped_s.clear()
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for report in _reports(message, self.link.peer):
             self.reports.append(report)
-            self.arrived_s.append(time.monotonic())
+            # When it was made: it may wait for a while until it is looked at here.
+            self.stamped_s.append(message.header.stamp.sec + message.header.stamp.nanosec * 1e-9)
 
     def stepping(self) -> bool:
         """Whether it has reported steps."""
@@ -83,7 +84,7 @@ class Measured:
         measured = {key: float(self.reports[-1][name]) for name, key in _KEYS.items()}
         # The first report reaches back before the reset.
         later = self.reports[1:]
-        measured["seconds"] = self.arrived_s[-1] - self.begun_s
+        measured["seconds"] = self.stamped_s[-1] - self.begun_s
         measured["rate_hz"] = sum(float(report["rate (Hz)"]) for report in later) / len(later)
         measured["cpu_share"] = sum(float(report["CPU (share of one core)"]) for report in later) / len(later)
         return measured

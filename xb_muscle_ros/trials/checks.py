@@ -8,6 +8,8 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.told_facts import check_told_facts
 from xb_muscle_ros.trials.trial import Array, Trial
 
+# With fewer nothing moves, and nothing can be compared.
+LEAST_SAMPLES = 3
 # Beyond these no fibre was measured; a record that goes there is in another unit.
 LENGTH_CHANGE_L0 = (-0.6, 1.0)
 FORCE_F0 = (-2.0, 10.0)
@@ -46,13 +48,22 @@ def check_values(trial: Trial, where: str, f0_is_told: bool = True, pca_is_told:
 
     Raises:
         UserError: length, force or calcium are in another unit than their topic or fact has, pCa is contrary to
-            calcium, amplitude or recovery to length, or samples are missing while length changes.
+            calcium, amplitude or recovery to length, or samples are too few or missing while length changes.
     """
+    _check_samples(trial, where)
     _check_calcium(trial, where)
     lines = (*_length(trial, where), *_force(trial, where, f0_is_told), *_median_force(trial, where, pca_is_told))
     lines += (*_gaps(trial, where), *_cover(trial, where))
     check_told_facts(trial, where)
     return lines
+
+
+def _check_samples(trial: Trial, where: str) -> None:
+    for what, samples in (("length", trial.time_s.size), ("measured force", trial.force_time_s.size)):
+        if samples < LEAST_SAMPLES and (samples or what == "length"):
+            raise UserError(
+                f"bag {where}: there are {samples} samples of {what}; needed are {LEAST_SAMPLES}; leave the bag out"
+            )
 
 
 def _length(trial: Trial, where: str) -> tuple[str, ...]:
