@@ -20,6 +20,8 @@ _UNITS = {
     "recovery_s": ("", "{:g} s", 1.0),
 }
 _MOST_LEVELS = 8
+# A column is wide enough for its title, mm.
+_COLUMN_MM = 44.0
 
 
 def draw_force(path: Path, section: Mapping[str, Any]) -> None:
@@ -30,7 +32,10 @@ def draw_force(path: Path, section: Mapping[str, Any]) -> None:
     """
     models = list(section["overall"])
     slices = {name: _thinned(entries) for name, entries in section["slices"].items() if len(entries) > 1}
-    with figure(24.0 + (26.0 + 4.0 * len(models)) * (1 + len(slices)), 140.0) as made:
+    # Slanting names reach to the left of the first column and below the last row.
+    longest = max(len(label(name)) for name in models)
+    columns = max(_COLUMN_MM, 26.0 + 4.0 * len(models)) * (1 + len(slices))
+    with figure(max(24.0, 1.2 * longest) + columns, 126.0 + 0.9 * longest) as made:
         axes = made.subplots(3, 1 + len(slices), squeeze=False, sharey="row")
         for row, (window, title) in enumerate(_WINDOWS.items()):
             _overall(axes[row][0], section, models, window)
