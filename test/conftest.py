@@ -36,6 +36,8 @@ def shared_cases(shared_data: Path) -> Path:
     """Small inputs with faults that users met, kept beside the recordings; tests that need them are skipped without."""
     folder = shared_data.parent / "cases"
     if not folder.is_dir():
+        if os.environ.get("XB_MUSCLE_REQUIRE_SHARED_DATA"):
+            pytest.fail(f"no cases at {folder}, and this run must not go without them")
         pytest.skip(f"no cases at {folder}")
     return folder
 

@@ -99,10 +99,8 @@ def test_an_end_that_only_the_prior_makes_is_said(start: Fibre, isometric: Trial
     assert [row["interval_ended_by"] for row in quadratic["parameters"]] == [["prior", "prior"]] * 2
 
 
-def test_the_handed_recording(start: Fibre, shared_data: Path) -> None:
-    path = shared_data.parent / "cases" / "fit" / "iso_pca61.csv"
-    if not path.is_file():
-        pytest.skip(f"no recording at {path}")
+def test_the_handed_recording(start: Fibre, shared_cases: Path) -> None:
+    path = shared_cases / "fit" / "iso_pca61.csv"
     time_s, length, force = np.genfromtxt(path, delimiter=",", skip_header=1).T
     trial = replace(still("iso", 6.1, time_s.size), length_m=length, force_time_s=time_s, force_n=force)
     report = found(start, trial, ["f", "k21"], **CHOICES)

@@ -1,4 +1,4 @@
-"""Figures of fits: axes that show the profile, ticks that can be read, ends that are told apart."""
+"""Figures of fits: axes that show the profile, ticks that can be read, ends that differ in look."""
 
 from __future__ import annotations
 

@@ -141,17 +141,8 @@ def test_a_file_that_the_metadata_lists_and_is_not_there_is_told(tmp_path: Path)
     assert "bag_1.mcap, which metadata.yaml lists, is missing" in found.warnings[0]
 
 
-@pytest.fixture(scope="module")
-def cases(shared_data: Path) -> Path:
-    """Small inputs that are kept beside the repository; tests that need them are skipped without."""
-    folder = shared_data.parent / "cases" / "bags"
-    if not folder.is_dir():
-        pytest.skip(f"no cases at {folder}")
-    return folder
-
-
-def test_handed_bag_after_reindexing(cases: Path) -> None:
-    (found,), _ = foreign.study(cases / "reindexed_custom_data")
+def test_handed_bag_after_reindexing(shared_cases: Path) -> None:
+    (found,), _ = foreign.study(shared_cases / "bags" / "reindexed_custom_data")
     assert found.facts.reference_length_m == pytest.approx(0.03)
     assert abs(found.length_change_l0).max() < 0.1
     assert "has lost its custom_data; the copy within" in found.warnings[0]
@@ -166,12 +157,12 @@ def test_handed_bag_after_reindexing(cases: Path) -> None:
     ],
 )
 def test_handed_bags_are_imported(
-    cases: Path, tmp_path: Path, name: str, samples: int, warning: str | None, capsys: pytest.CaptureFixture[str]
+    shared_cases: Path, tmp_path: Path, name: str, samples: int, warning: str | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from xb_muscle_ros.cli.main import main
 
-    arguments = ["import", str(cases / name), "--mapping", str(cases.parent / "bagmap.yaml"), "--out", str(tmp_path)]
-    assert main(arguments) == 0
+    arguments = ["import", str(shared_cases / "bags" / name), "--mapping", str(shared_cases / "bagmap.yaml")]
+    assert main([*arguments, "--out", str(tmp_path)]) == 0
     said = capsys.readouterr()
     trial = read_trial(tmp_path / f"ankle_{name}")
     assert trial.time_s.size == samples

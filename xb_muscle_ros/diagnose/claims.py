@@ -46,7 +46,7 @@ def beyond_chance(facts: Facts) -> bool:
 
 
 def together(facts: Facts) -> bool:
-    """Whether several names in the answer act together, rather than being rivals that cannot be told apart."""
+    """Whether several names in the answer act together, rather than being rivals that cannot be distinguished."""
     answer = facts["answer"]
     if facts["verdict"] == "ambiguous" or len(answer) < 2:
         return False

@@ -266,6 +266,10 @@ def model_of_set(name: str, where: str = "") -> str:
     return split_set(name, where)[0]
 
 
+PUSHES_F0 = -1e-3
+"""Force below it, F0, is a push; rounding of a slack fibre stays above."""
+
+
 def slack_of(name: str) -> str | None:
     """Set or model of the same blocks whose series spring goes slack; None where it does already.
 

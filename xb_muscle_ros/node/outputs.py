@@ -9,6 +9,7 @@ import numpy as np
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.models.muscle import Outputs
+from xb_muscle_ros.models.registry import PUSHES_F0
 from xb_muscle_ros.node.inputs import Scale
 from xb_muscle_ros.node.several import Floats, Indices
 from xb_muscle_ros.trials.simulated import MOMENTS
@@ -30,10 +31,6 @@ def room(message: JointState, field: str, size: int) -> MutableSequence[float]:
     # The message keeps a copy of what it is given; only its own array is worth holding on to.
     values: MutableSequence[float] = getattr(message, field)
     return values
-
-
-# Force below it, F0, is a push; rounding of a slack fibre stays above.
-_PUSHES_F0 = -1e-3
 
 
 class OutputMessages:
@@ -66,7 +63,7 @@ class OutputMessages:
         for message in (self._force, self._moments):
             stamp = message.header.stamp
             stamp.sec, stamp.nanosec = sec, nanosec
-        if outputs.force_f0 < _PUSHES_F0 and (self.pushed is None or outputs.force_f0 < self.pushed[1]):
+        if outputs.force_f0 < PUSHES_F0 and (self.pushed is None or outputs.force_f0 < self.pushed[1]):
             self.pushed = self._force.name[0], outputs.force_f0
         reference = scale.reference_length_m
         self._effort[0] = outputs.force_f0 * scale.f0_n
@@ -113,7 +110,7 @@ class OutputMessagesMany:
         pair = self._all if which is None else _Pair([self._names[i] for i in which.tolist()])
         pair.fill(stamp_ns, outputs, scales)
         least = outputs[:, _FORCE].min()
-        if least < _PUSHES_F0 and (self.pushed is None or least < self.pushed[1]):
+        if least < PUSHES_F0 and (self.pushed is None or least < self.pushed[1]):
             self.pushed = pair.force.name[int(outputs[:, _FORCE].argmin())], float(least)
         self._to_force.publish(pair.force)
         if self._to_moments.get_subscription_count():

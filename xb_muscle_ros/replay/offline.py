@@ -8,7 +8,7 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError, naming
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.models.registry import slack_of
+from xb_muscle_ros.models.registry import PUSHES_F0, slack_of
 from xb_muscle_ros.trials.ros_types import to_ns
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
 from xb_muscle_ros.trials.trial import Array, Trial
@@ -70,10 +70,6 @@ def as_simulated(muscle: Muscle, trial: Trial, time_s: Array, states: Array) -> 
     )
 
 
-# Forces below it, F0, are worth a word: a tendon of nothing but rounding stays above.
-_PUSHES_F0 = -1e-3
-
-
 def pushing(trial: Trial, simulated: Simulated, model: str) -> str | None:
     """One line on a model that pushes, where a muscle would be slack; None where it pulls.
 
@@ -87,7 +83,7 @@ def pushing(trial: Trial, simulated: Simulated, model: str) -> str | None:
 def pushing_line(trial: str, model: str, time_s: Array, force_f0: Array) -> str | None:
     """The line of `pushing`, from the name of a trial and its force, shape (n,), s and F0."""
     k = int(np.argmin(force_f0))
-    if force_f0[k] >= _PUSHES_F0:
+    if force_f0[k] >= PUSHES_F0:
         return None
     slack = slack_of(model)
     remedy = f"; in model {slack} the series spring goes slack (docs/model.md)" if slack else ""

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.phases import conditioning
 from xb_muscle_ros.trials.readers.calcium import PCA_RANGE, read_calcium
 from xb_muscle_ros.trials.readers.clock import GAP_STEPS, gaps, read_clock, times_of
 from xb_muscle_ros.trials.readers.description import ImportMapping
@@ -49,7 +50,7 @@ def trial_of(recording: Recording, mapping: ImportMapping, path: Path, isometric
     force_s = clock.time_s if recording.force is None else times_of(recording.force, clock, recording, mapping)
     context = Context(where, force_s, length.phases, calcium.pca)
     force = read_force(recording.force, mapping, context, isometric_scaling)
-    amplitude_l0, recovery_s = _measured(clock.time_s, length)
+    amplitude_l0, recovery_s = conditioning(clock.time_s, length.length_m, length.reference_m, length.phases)
     notes = (mapping.source, *recording.notes, *length.notes, *calcium.notes, *force.notes)
     facts = TrialFacts(
         fibre=mapping.fibre_of(path),
@@ -128,14 +129,3 @@ def _onset(recording: Recording, length: Length) -> tuple[str, ...]:
         return ()
     shown = "shows no test stretch" if found is None else f"shows the test stretch at {found:.6g} s"
     return (f"{recording.where}: the length record {shown}; the file tells of one at {told_s:.6g} s",)
-
-
-def _measured(time_s: Array, length: Length) -> tuple[float | None, float | None]:
-    """Amplitude of the conditioning stretch (L0; 0 for a reference trial) and recovery (s) as the record shows them."""
-    found = {phase.name: phase for phase in length.phases}
-    if "conditioning_stretch" not in found:
-        return (0.0 if "test_stretch" in found else None), None
-    peak = np.interp(found["conditioning_stretch"].end_s, time_s, length.length_m)
-    recovery = found.get("recovery")
-    recovery_s = round(recovery.end_s - recovery.start_s, 4) if recovery else 0.0
-    return round(float(peak / length.reference_m - 1.0), 4), recovery_s

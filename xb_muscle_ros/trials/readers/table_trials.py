@@ -1,4 +1,4 @@
-"""Trials in one table: told apart by a column, or by time that starts anew; and pCa that the table tells beside."""
+"""Trials in one table: separated by a column, or by time that starts anew; and pCa that the table tells beside."""
 
 from __future__ import annotations
 
