@@ -6,6 +6,7 @@ A name is that of a model, and behind it any number of mechanisms: ``3state_coop
 from __future__ import annotations
 
 import functools
+import hashlib
 from collections.abc import Iterator, Mapping
 from itertools import product
 from types import MappingProxyType
@@ -107,12 +108,18 @@ class HillRow(NamedTuple):
         )
 
 
+# Of a compiled module's name; the rest is a hash.
+_LONGEST = 120
+
+
 def _same_as(row: Row | HillRow, name: str) -> str:
     """Name of the compiled module: models of the same blocks share it, whatever they are called."""
     bare = row._replace(extras=())
     own = "_with_".join(part for part in name.split(SEPARATOR) if part not in EXTRAS)
     same = next((known for known, blocks in MODELS.items() if blocks == bare), own)
-    return "_with_".join([same, *(extra.name for extra in row.extras)])
+    named = "_with_".join([same, *(extra.name for extra in row.extras)])
+    # File systems allow names of 255 bytes.
+    return named if len(named) <= _LONGEST else f"{named[:_LONGEST]}_{hashlib.sha256(named.encode()).hexdigest()[:8]}"
 
 
 _BASES: Mapping[str, Row | HillRow] = {
