@@ -1,0 +1,422 @@
+"""A diagnosis: one frozen record that the JSON, the prose, the page and the figures read.
+
+Forces are in units of F0, lengths in L0, times in s. Shares are fractions of the mismatch's mean square beyond noise.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+
+FORMAT = 2
+"""Version of `diagnosis.json`."""
+NAMED, SURE = 0.5, 0.9
+"""Inclusion probability from which a mechanism is in the answer, and from which physics may be the verdict."""
+
+
+class Verdict(str, enum.Enum):
+    """What a diagnosis says as a whole."""
+
+    NONE = "none"
+    """The fibre file as given is as good as the data can tell."""
+    MEASUREMENT = "measurement"
+    """Measurement artefacts beyond the ordinary, and no physics."""
+    PARAMETERS = "parameters"
+    """Other values of the same parameters are enough."""
+    PHYSICS = "physics"
+    """At least one mechanism is sure and predicts held-out conditions better; it may explain only a part."""
+    AMBIGUOUS = "ambiguous"
+    """Mechanisms have evidence, but none is sure or none predicts better beyond its standard error."""
+    UNEXPLAINED = "unexplained"
+    """There is a mismatch, and nothing has evidence."""
+
+
+class Kind(str, enum.Enum):
+    """What a component is."""
+
+    MECHANISM = "mechanism"
+    ARTEFACT = "artefact"
+    """A measurement artefact beyond what is ordinary."""
+
+
+@dataclass(frozen=True)
+class HeldOutGain:
+    """What a component, or the whole answer, gains on conditions that were left out of the fit.
+
+    Attributes:
+        mean: mean over the conditions of the logarithm of RMSD without over RMSD with it; above 0 where it predicts
+            better.
+        se: standard error of the mean over conditions.
+        unit: of mean and se: ``log RMSD ratio``.
+        conditions: how many were left out in turn.
+        without_f0, with_f0: RMSD over all held-out samples, F0.
+    """
+
+    mean: float
+    se: float
+    unit: str
+    conditions: int
+    without_f0: float
+    with_f0: float
+
+    @property
+    def beyond_error(self) -> bool:
+        """Whether the gain exceeds its standard error."""
+        return self.mean > self.se
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A component's parameter.
+
+    Attributes:
+        name, unit: of the parameter table, or of the artefact, with its group in brackets.
+        value: estimate, averaged over the sets that have the component; over fibres: the centre of their distribution.
+        interval: 95 %, without the probability that the component is absent.
+        at_bound: the estimate lies at a bound.
+        spread: standard deviation over fibres, in its unit; None for one fibre.
+    """
+
+    name: str
+    unit: str
+    value: float
+    interval: tuple[float, float]
+    at_bound: bool = False
+    spread: float | None = None
+
+
+@dataclass(frozen=True)
+class OfFibre:
+    """A component in one fibre of a study.
+
+    Attributes:
+        fibre: name.
+        inclusion_probability: from this fibre's recordings alone.
+        share_of_mismatch: of this fibre's.
+        heldout_gain: None where nothing could be left out.
+        parameters: estimates in this fibre.
+    """
+
+    fibre: str
+    inclusion_probability: float
+    share_of_mismatch: float
+    heldout_gain: HeldOutGain | None
+    parameters: tuple[Parameter, ...]
+
+
+@dataclass(frozen=True)
+class Component:
+    """Something that may be part of what the model lacks, or of what the recordings have wrong.
+
+    Attributes:
+        name: of the mechanism or artefact, or of a family whose members cannot be told apart.
+        kind: see `Kind`.
+        family: of `names.FAMILY`.
+        members: names in it, the likeliest first; a single name: itself.
+        inclusion_probability: that it, or one of its members, is part of the truth.
+        share_of_mismatch: what of the base's mismatch comes back without it (0 where it is not part of the answer).
+        heldout_gain: what is lost without it on held-out conditions; None where it was not tried.
+        parameters: of the likeliest member.
+        direction: what it does to the force, in plain words; empty where it is not part of the answer.
+        not_separable_from: names of other components with which it trades probability.
+        by_fibre: one row for each fibre, also where there is one.
+    """
+
+    name: str
+    kind: Kind
+    family: str
+    members: tuple[str, ...]
+    inclusion_probability: float
+    share_of_mismatch: float = 0.0
+    heldout_gain: HeldOutGain | None = None
+    parameters: tuple[Parameter, ...] = ()
+    direction: str = ""
+    not_separable_from: tuple[str, ...] = ()
+    by_fibre: tuple[OfFibre, ...] = ()
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a residual stands out.
+
+    Attributes:
+        fibre, trial, phase: where; times of the trial, s.
+        pca: of the solution; None where it changes.
+        size_f0: root mean square of measured less simulated force, F0.
+        mean_f0: its mean, F0: above 0 where the fibre pulls harder than the model.
+        p_value: family-wise.
+    """
+
+    fibre: str
+    trial: str
+    phase: str
+    start_s: float
+    end_s: float
+    size_f0: float
+    mean_f0: float
+    p_value: float
+    pca: float | None = None
+
+
+@dataclass(frozen=True)
+class Law:
+    """What a residual follows: memories of stretch, described and not explained.
+
+    Attributes:
+        fibre: whose.
+        time_constant_s: the dominant one.
+        scales_with: ``constant``, ``activation``, ``calcium`` or ``force``.
+        gain_f0_per_l0: force per length of a sudden change.
+        explained: share of the residual's mean square that it predicts in trials left out.
+        tau_s, weight_f0: of all memories.
+        others: the share for what else it could scale with.
+    """
+
+    fibre: str
+    time_constant_s: float
+    scales_with: str
+    gain_f0_per_l0: float
+    explained: float
+    tau_s: tuple[float, ...] = ()
+    weight_f0: tuple[float, ...] = ()
+    others: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Remaining:
+    """What the answer leaves.
+
+    Attributes:
+        rmsd_f0: of all trials, F0.
+        noise_f0: of the recordings, F0.
+        where: the largest first; empty where nothing stands out.
+        law: None where none holds.
+    """
+
+    rmsd_f0: float
+    noise_f0: float
+    where: tuple[Place, ...]
+    law: Law | None
+
+
+@dataclass(frozen=True)
+class Scores:
+    """How far one model is from the recordings, F0.
+
+    Attributes:
+        names: mechanisms and artefacts in it beside the base; empty: the base.
+        train_rmsd_f0: fitted to all trials.
+        heldout_rmsd_f0: of conditions left out of the fit; None where none were.
+    """
+
+    names: tuple[str, ...]
+    train_rmsd_f0: float
+    heldout_rmsd_f0: float | None
+
+
+@dataclass(frozen=True)
+class SetOfMechanisms:
+    """One of the sets that were averaged over.
+
+    Attributes:
+        names: in it; empty: the base.
+        probability: of the set, among all sets considered.
+        log_evidence: relative to the best set.
+        rmsd_f0: after its fit, or as predicted to first order.
+        fitted: whether it was fitted, rather than predicted from a neighbour.
+    """
+
+    names: tuple[str, ...]
+    probability: float
+    log_evidence: float
+    rmsd_f0: float
+    fitted: bool
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """An ordinary measurement error as estimated.
+
+    Attributes:
+        fibre: whose.
+        name, group: of the artefact; group: the solution or trial, empty for the whole study.
+        unit: of value, sd and prior_sd.
+        value: estimate with the answer's model.
+        sd: standard error.
+        prior_sd: what is ordinary.
+    """
+
+    fibre: str
+    name: str
+    group: str
+    unit: str
+    value: float
+    sd: float | None
+    prior_sd: float
+
+
+@dataclass(frozen=True)
+class OfTrial:
+    """One trial before and after.
+
+    Attributes:
+        fibre, trial, pca: which.
+        phases: name, start and end in s.
+        noise_sd_f0, noise_from, noise_samples: of its force; `noise_from` as in `scores.noise.model.Source`.
+        before_rmsd_f0, after_rmsd_f0: base and answer, fitted to all trials.
+        heldout_before_f0, heldout_after_f0: predicted by fits that did not see its condition; None where none was
+            left out.
+    """
+
+    fibre: str
+    trial: str
+    pca: float | None
+    phases: tuple[tuple[str, float, float], ...]
+    noise_sd_f0: float
+    noise_from: str
+    noise_samples: int
+    before_rmsd_f0: float
+    after_rmsd_f0: float
+    heldout_before_f0: float | None
+    heldout_after_f0: float | None
+
+
+@dataclass(frozen=True)
+class OfStudyFibre:
+    """One fibre of the study as a whole.
+
+    Attributes:
+        fibre: name.
+        model: base set.
+        trials: how many.
+        answer: names with probability of `NAMED` and more from this fibre alone.
+        before, after: base, and the study's answer fitted to this fibre.
+        left_out_rmsd_f0: this fibre predicted with effects as the other fibres have them, base and answer, F0; None
+            where there are no others.
+        p_value: of its mismatch.
+        base_parameters: name, value in the fibre file, fitted value with the base alone, unit.
+        closure_f0: what the Gaussian form's own error amounts to here, F0; 0 where it was not taken out.
+    """
+
+    fibre: str
+    model: str
+    trials: int
+    answer: tuple[str, ...]
+    before: Scores
+    after: Scores
+    left_out_rmsd_f0: tuple[float, float] | None
+    p_value: float
+    base_parameters: tuple[tuple[str, float, float, str], ...]
+    closure_f0: float
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A tabulated feature, measured and predicted.
+
+    Attributes:
+        fibre: whose.
+        name: ``isometric force`` (F0) or ``SRS`` (F0/L0).
+        condition: in words: pCa, amplitude, recovery.
+        measured, before, after: value, by the base and by the answer.
+        used: whether the fit had it; else it was predicted.
+    """
+
+    fibre: str
+    name: str
+    condition: str
+    measured: float
+    before: float
+    after: float
+    used: bool
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """What to record next.
+
+    Attributes:
+        bag: folder with the protocol.
+        protocol: in words.
+        separates: names of the components that it separates.
+        expected_difference_f0: between the two models on it, root mean square, F0.
+    """
+
+    bag: str
+    protocol: str
+    separates: tuple[str, ...]
+    expected_difference_f0: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """All that a diagnosis found.
+
+    Attributes:
+        format_version: see `FORMAT`.
+        fibres: in the order given.
+        model, method: of the base.
+        quick, seed, seconds: how it was made.
+        verdict: see `Verdict`.
+        answer: mechanisms with an inclusion probability of `NAMED` or more, best first.
+        components: all candidates, the most probable first.
+        explained_share: of the mismatch by the answer.
+        mismatch: where the base differs, the largest first.
+        p_value: chance that noise leaves as much as the base did.
+        described: False where the base does not describe the recordings at all, or noise hides everything.
+        remaining: what the answer leaves.
+        base_law: what the base's residual follows; None where none holds.
+        before, after: scores of base and answer.
+        heldout_gain: of the answer as a whole; None where nothing was left out.
+        benchmark_rmsd_f0: held-out RMSD of a non-parametric discrepancy benchmark; None where there is none.
+        sets: sets averaged over, the most probable first.
+        by_fibre, trials, nuisances, features: rows.
+        map_before, map_after: trials x phases residual maps for the figures (see `Significance.map`), by fibre.
+        next_experiment: None where nothing is to be separated.
+        augmented: files of the augmented fibres, by fibre; empty where the answer has no mechanism.
+        warnings: a line each, such as absurd forces outside the study.
+        missing: what a firmer answer needs, a line each.
+        notes: what was assumed, skipped or left out, a line each.
+    """
+
+    format_version: int
+    fibres: tuple[str, ...]
+    model: str
+    method: str
+    quick: bool
+    seed: int
+    seconds: float
+    verdict: Verdict
+    answer: tuple[str, ...]
+    components: tuple[Component, ...]
+    explained_share: float
+    mismatch: tuple[Place, ...]
+    p_value: float
+    described: bool
+    remaining: Remaining
+    base_law: Law | None
+    before: Scores
+    after: Scores
+    heldout_gain: HeldOutGain | None
+    benchmark_rmsd_f0: float | None
+    sets: tuple[SetOfMechanisms, ...]
+    by_fibre: tuple[OfStudyFibre, ...]
+    trials: tuple[OfTrial, ...]
+    nuisances: tuple[Nuisance, ...]
+    features: tuple[Feature, ...] = ()
+    map_before: dict[str, dict[str, list[object]]] = field(default_factory=dict)
+    map_after: dict[str, dict[str, list[object]]] = field(default_factory=dict)
+    next_experiment: NextExperiment | None = None
+    augmented: dict[str, str] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def component(self, name: str) -> Component | None:
+        """The component of a name, or that has it as a member."""
+        return next((c for c in self.components if c.name == name or name in c.members), None)
+
+    @property
+    def named(self) -> tuple[Component, ...]:
+        """Components with probability of `NAMED` and more, mechanisms and artefacts."""
+        return tuple(c for c in self.components if c.inclusion_probability >= NAMED)
