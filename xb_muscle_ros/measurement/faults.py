@@ -53,3 +53,6 @@ _ROWS = (
 
 FAULTS: Mapping[str, Fault] = MappingProxyType({row.name: row for row in _ROWS})
 """All faults by name."""
+
+ORDINARY: tuple[str, ...] = ("pca_shift", "length_gain", "run_down", "force_offset", "time_shift")
+"""Faults that every real set has a little of, in the order of `FAULTS`: part of every model unless asked otherwise."""
