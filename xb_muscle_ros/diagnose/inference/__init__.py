@@ -1,0 +1,1 @@
+"""What fits of many sets say together: evidence, inclusion probabilities, held-out gains."""

@@ -1,0 +1,1 @@
+"""The search: sets of mechanisms and artefacts, fitted one after another to every fibre of a study."""

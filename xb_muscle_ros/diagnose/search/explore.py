@@ -1,0 +1,277 @@
+"""The search: sets of mechanisms and artefacts, one more at a time, and then everything beside the best of them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.diagnose.inference.population import Estimate, replication
+from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
+from xb_muscle_ros.diagnose.search.descent import Descent, Fit
+from xb_muscle_ros.diagnose.search.promise import Linear, Promise, promise
+from xb_muscle_ros.diagnose.search.system import Names, System, label, ordered
+from xb_muscle_ros.diagnose.search.whole import beside
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.catalogue import CATALOGUE
+from xb_muscle_ros.work import Options, run
+
+# Chance, before anything is seen, that a mechanism is part of the truth, or an artefact beyond the ordinary.
+_PRIOR_ODDS = {True: np.log(0.1), False: np.log(0.05)}
+# A set is worth going on from if the evidence rises by so much.
+_WORTH = 0.5
+# Form errors of mechanisms: share of what a mechanism does that its form here gets wrong.
+FORM = 0.12
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How hard to look.
+
+    Attributes:
+        steps: names in a set at most.
+        candidates: fitted at each step, the most promising first.
+        rivals: fitted in the place of each name of the best set.
+        most: Jacobians of a fit.
+        tolerance: fall of the cost at which a fit stops.
+    """
+
+    steps: int = 6
+    candidates: int = 6
+    rivals: int = 4
+    most: int = 10
+    tolerance: float = 0.02
+
+
+QUICK = Effort(steps=5, candidates=4, rivals=2, most=5, tolerance=0.1)
+
+
+def fit_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Fit a set from the best of several starts; None where the model has no solution at any."""
+    system = System.from_json(task["system"])
+    found = fitted(system, [Name(n) for n in task["names"]], task["starts"], task["most"], task["tolerance"])
+    return None if found is None else found.to_json()
+
+
+def fitted(
+    system: System, names: Collection[Name], starts: Sequence[Mapping[str, float]], most: int, tolerance: float
+) -> Fit | None:
+    """Fit a set from the best of several starts; None where the model has no solution at any."""
+    begun = []
+    for start in starts:
+        try:
+            problem = system.problem(names, start)
+            descent = Descent(system, problem)
+            if len(starts) == 1:
+                begun.append((0.0, descent, problem.start, None))
+                continue
+            point, slopes = descent.walk(problem.start, 2, tolerance)
+            begun.append((descent.cost(point), descent, point.z, slopes))
+        except (UserError, np.linalg.LinAlgError):
+            continue
+    for _, descent, z, slopes in sorted(begun, key=lambda b: b[0]):
+        try:
+            point, slopes = descent.walk(z, most, tolerance)
+            return descent.fit(ordered(names), point, slopes)
+        except (UserError, np.linalg.LinAlgError):
+            continue
+    return None
+
+
+class Explorer:
+    """Fits sets to every fibre of a study, each once.
+
+    Attributes:
+        fits: by set, one for each fibre; sets for which the model has no solution in some fibre are in `unsolved`.
+        promised: first-order mean squares by set, one for each fibre, of sets that were not fitted.
+    """
+
+    def __init__(self, systems: Sequence[System], effort: Effort, options: Options) -> None:
+        self.systems, self.effort, self.options = list(systems), effort, options
+        self.fits: dict[Names, tuple[Fit, ...]] = {}
+        self.promised: dict[Names, tuple[float, ...]] = {}
+        self.unsolved: list[Names] = []
+        self._replication: dict[Names, float] = {}
+        self._linear: dict[Names, list[Linear]] = {}
+        self.floors_f0 = [s.noise_f0 for s in systems]
+
+    def fit(self, wanted: Sequence[tuple[Collection[Name], Sequence[Sequence[Mapping[str, float]]]]], why: str) -> list[Names]:
+        """Fit sets, each with starts for every fibre; those that have a solution in all of them."""
+        missing = [(ordered(names), starts) for names, starts in wanted if ordered(names) not in self.fits]
+        tasks = [
+            {
+                "system": plain,
+                "names": [n.value for n in names],
+                "starts": [dict(s) for s in of_fibre],
+                "most": self.effort.most,
+                "tolerance": self.effort.tolerance,
+            }
+            for names, starts in missing
+            for plain, of_fibre in zip(self._plain(), starts, strict=True)
+        ]
+        rows = run(fit_task, tasks, replace(self.options, label=why)) if tasks else []
+        count = len(self.systems)
+        for i, (names, _) in enumerate(missing):
+            own = rows[i * count : (i + 1) * count]
+            if any(row is None for row in own):
+                self.unsolved.append(names)
+            else:
+                self.fits[names] = tuple(Fit.from_json(row) for row in own)
+        return [ordered(names) for names, _ in wanted if ordered(names) in self.fits]
+
+    def _plain(self) -> list[dict[str, Any]]:
+        return [s.to_json() for s in self.systems]
+
+    def linear(self, names: Names) -> list[Linear]:
+        """Fits of a set, taken as linear."""
+        if names not in self._linear:
+            self._linear[names] = [Linear(s, f) for s, f in zip(self.systems, self.fits[names], strict=True)]
+        return self._linear[names]
+
+    def evidence(self, names: Names) -> float:
+        """Logarithm of a set's probability but for a constant, all fibres together."""
+        own = [-self._cost(s, f, floor) for s, f, floor in zip(self.systems, self.fits[names], self.floors_f0, strict=True)]
+        return float(sum(own)) + self.odds(names) + self.replication(names)
+
+    def estimates(self, names: Names) -> dict[str, list[Estimate]]:
+        """Coordinates of the mechanisms of a set in every fibre, by label."""
+        fits = self.fits[names]
+        own = [n for n in names if n not in MEASUREMENT]
+        labels = dict.fromkeys(label for n in own for label in CATALOGUE[n.value].parameters)
+        found: dict[str, list[Estimate]] = {label: [] for label in labels}
+        for system, fit in zip(self.systems, fits, strict=True):
+            coordinates = {c.label: c for c in system.problem(names, fit.values).coordinates}
+            for label in labels:
+                c = coordinates[label]
+                found[label].append(Estimate(c.inward(fit.values[label]), fit.sds[label], c.prior_mean, c.prior_sd))
+        return found
+
+    def replication(self, names: Names) -> float:
+        """What it adds to the evidence that effects are alike in all fibres."""
+        if len(self.systems) < 2:
+            return 0.0
+        if names not in self._replication:
+            self._replication[names] = sum(replication(e) for e in self.estimates(names).values())
+        return self._replication[names]
+
+    @staticmethod
+    def odds(names: Names) -> float:
+        """Logarithm of the chance of a set before anything is seen."""
+        return float(sum(_PRIOR_ODDS[n not in MEASUREMENT] for n in names))
+
+    @staticmethod
+    def _cost(system: System, fit: Fit, floor_f0: float) -> float:
+        return fit.cost(system, floor_f0) + fit.occam
+
+    def best(self) -> Names:
+        """The set with the most evidence."""
+        return max(self.fits, key=self.evidence)
+
+    def refloor(self) -> None:
+        """Count what forms of mechanisms get wrong as noise, by what they do."""
+        best = self.best()
+        for i, system in enumerate(self.systems):
+            gone = max(self.fits[()][i].mean_square_f0 - self.fits[best][i].mean_square_f0, 0.0)
+            self.floors_f0[i] = float(np.sqrt(system.noise_f0**2 + FORM**2 * gone))
+
+    def candidates(self, names: Names) -> list[Name]:
+        """What may be put beside a set."""
+        allowed = set.intersection(*(set(beside(s.fibre)) for s in self.systems))
+        return [n for n in Name if (n in allowed or n in MEASUREMENT) and n not in names]
+
+    def promises(self, names: Names) -> dict[Name, list[Promise]]:
+        """What every candidate promises beside a set, in every fibre."""
+        linear = self.linear(names)
+        found: dict[Name, list[Promise]] = {}
+        for name in self.candidates(names):
+            try:
+                found[name] = [promise(one, name) for one in linear]
+            except (UserError, np.linalg.LinAlgError):
+                continue
+            self.promised[ordered((*names, name))] = tuple(p.mean_square_f0 for p in found[name])
+        return found
+
+    def step(self, names: Names, count: int, blind: bool) -> list[Names]:
+        """Fit the most promising candidates beside a set."""
+        promises = self.promises(names)
+        gains = {n: float(sum(p.gain for p in ps)) for n, ps in promises.items()}
+        told = sorted((n for n in gains if not np.isnan(gains[n])), key=lambda n: -gains[n])
+        # An odd name more costs its odds; what promises less than that is not fitted.
+        chosen = [n for n in told if gains[n] > 1.0][:count]
+        chosen += [n for n in gains if np.isnan(gains[n]) and blind]
+        wanted = []
+        for n in chosen:
+            starts = [[*p.starts] for p in promises[n]]
+            if np.isnan(gains[n]):
+                own = CATALOGUE_STARTS(self.systems, n)
+                starts = [[*s, *o] for s, o in zip(starts, own, strict=True)]
+            wanted.append(((*names, n), starts))
+        return self.fit(wanted, f"{label(names)} and one more")
+
+    def explore(self) -> Names:
+        """Search; the set with the most evidence."""
+        self.fit([((), [[{}, *_spread(s)] for s in self.systems])], "base")
+        if () not in self.fits:
+            s = self.systems[0]
+            raise UserError(
+                f"fibre {s.fibre.name}, model {s.fibre.model}: no solution at the values of the fibre file; start from "
+                "another one"
+            )
+        current: Names = ()
+        for k in range(self.effort.steps):
+            found = self.step(current, self.effort.candidates, blind=k < 2)
+            self.refloor()
+            best = max(found, key=self.evidence, default=current)
+            if best == current or self.evidence(best) < self.evidence(current) + _WORTH:
+                break
+            current = self._pruned(best)
+        self.refloor()
+        current = self.best()
+        self._around(current)
+        self.refloor()
+        again = self.best()
+        if again != current:
+            self._around(again)
+        return self.best()
+
+    def _pruned(self, names: Names) -> Names:
+        """Without what has become superfluous."""
+        if len(names) < 2:
+            return names
+        shorter = self._shorter(names)
+        best = max(shorter, key=self.evidence, default=names)
+        return self._pruned(best) if self.evidence(best) > self.evidence(names) else names
+
+    def _shorter(self, names: Names) -> list[Names]:
+        wanted = []
+        for n in names:
+            rest = tuple(m for m in names if m is not n)
+            wanted.append((rest, [[f.values] for f in self.fits[names]]))
+        return self.fit(wanted, f"{label(names)} but one")
+
+    def _around(self, names: Names) -> None:
+        """Fit what is beside a set: without each name, with another in its place, with one more."""
+        self._shorter(names)
+        for n in names:
+            rest = tuple(m for m in names if m is not n)
+            if rest in self.fits:
+                self.step(rest, self.effort.rivals, blind=len(names) <= 1)
+        self.step(names, self.effort.rivals, blind=False)
+
+
+def CATALOGUE_STARTS(systems: Sequence[System], name: Name) -> list[list[dict[str, float]]]:
+    """Starts of a mechanism from the fibre file's own parameters."""
+    return [[dict(s) for s in CATALOGUE[name.value].starting_values(system.fibre.values)] for system in systems]
+
+
+def _spread(system: System) -> list[dict[str, float]]:
+    """Further points to start the base from: more and less cooperativity, faster and slower heads."""
+    values = system.fibre.values
+    found: list[dict[str, float]] = []
+    for factors in ({"koop": 3.0, "kon": 0.6}, {"koop": 0.4, "kon": 1.4}, {"f": 0.7, "k11": 0.5}):
+        start = {name: values[name] * factor for name, factor in factors.items() if values.get(name, 0.0) > 0.0}
+        if start and start not in found:
+            found.append(start)
+    return found

@@ -1,0 +1,155 @@
+"""One fibre of a study: its trials and the fit of any set of mechanisms and artefacts to them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
+from xb_muscle_ros.diagnose.search.thinning import thinned
+from xb_muscle_ros.diagnose.search.whole import _SWITCHED, frame_of, whole
+from xb_muscle_ros.fit.coordinates import Coordinate, fault_coordinates, mechanism_coordinates, parameter_coordinates
+from xb_muscle_ros.fit.correction import Correction
+from xb_muscle_ros.fit.data import FitTrial
+from xb_muscle_ros.fit.problem import Problem
+from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
+from xb_muscle_ros.models.catalogue import CATALOGUE, Entry
+from xb_muscle_ros.models.fibre_file import Fibre
+
+Array = npt.NDArray[np.float64]
+Names = tuple[Name, ...]
+
+BEYOND = 6.0
+"""An artefact that is named may be so much larger than an ordinary one."""
+
+
+def ordered(names: Collection[Name]) -> Names:
+    """Names of a set in their usual order, each once."""
+    return tuple(name for name in Name if name in set(names))
+
+
+def label(names: Collection[Name]) -> str:
+    """A set for people and files."""
+    return " + ".join(name.value for name in ordered(names)) or "base"
+
+
+@dataclass(frozen=True)
+class System:
+    """Trials of one fibre with the fibre that is to explain them.
+
+    Attributes:
+        fibre: as it was given: start values, model, method; smoothing off.
+        trials: thinned, in the order of recording.
+        weights: of the samples of all trials, one below the other, shape (n,): independent residuals each stands for.
+        noise_f0: standard deviation that a residual has at least, noise and numerics, F0.
+        closure_f0: what the Gaussian form leaves out of the distribution's force at the thinned times, by trial.
+    """
+
+    fibre: Fibre
+    trials: tuple[FitTrial, ...]
+    weights: Array
+    noise_f0: float
+    closure_f0: Mapping[str, Array] = field(default_factory=dict)
+
+    @staticmethod
+    def of(fibre: Fibre, trials: Sequence[FitTrial], noise_f0: float) -> System:
+        """Of trials as they were recorded."""
+        parts = [thinned(trial) for trial in trials]
+        weights = np.concatenate([part.weights for part in parts])
+        return System(fibre, tuple(part.trial for part in parts), weights, noise_f0)
+
+    @property
+    def measured(self) -> Array:
+        """Force of all trials, one below the other, F0."""
+        return np.concatenate([t.measured_f0 for t in self.trials])
+
+    def without(self, held_out: Collection[str]) -> System:
+        """The system without some trials."""
+        sizes = [t.measured_f0.size for t in self.trials]
+        keep = np.repeat([t.name not in held_out for t in self.trials], sizes)
+        kept = tuple(t for t in self.trials if t.name not in held_out)
+        return replace(self, trials=kept, weights=self.weights[keep])
+
+    def problem(self, names: Collection[Name], values: Mapping[str, float]) -> Problem:
+        """The fit of a set.
+
+        Args:
+            names: of the set.
+            values: by label of coordinate, for those that are not to start as the fibre or the catalogue says; those
+                of mechanisms that are not in the set are left alone.
+        """
+        names = ordered(names)
+        fibre = whole(self.fibre, frame_of(names))
+        present = dict(fibre.values)
+        coordinates = [c for c in parameter_coordinates(self.fibre, None, (), {}, {}) if c.name in present]
+        for name in (n for n in names if n not in MEASUREMENT):
+            entry = CATALOGUE[name.value]
+            start = entry.starting_values(self.fibre.values)[0]
+            # What the catalogue starts from besides what is fitted, such as a rate of rebinding.
+            present |= {n: float(v) for n, v in start.items() if n in present}
+            present |= {key: _usual(key) for key in _SWITCHED.get(name, {})}
+            coordinates += _of_mechanism(entry, self.fibre.values, present)
+        for c in coordinates:
+            present[c.name] = values.get(c.name, present[c.name])
+        fibre = replace(fibre, values=present)
+        coordinates += self._artefacts(names)
+        merged = tuple(_started(c, values, present) for c in {c.label: c for c in coordinates}.values())
+        correction = None
+        if self.closure_f0:
+            correction = Correction(
+                np.zeros(len(merged)), self.closure_f0, {}, np.empty(0), np.empty((0, len(merged)))
+            )
+        return Problem(fibre, self.trials, merged, {}, correction=correction)
+
+    def _artefacts(self, names: Names) -> list[Coordinate]:
+        """Ordinary measurement errors, wider where named, and those that are in a set only."""
+        named = {n.value for n in names if n in MEASUREMENT}
+        wanted = [n for n in FAULTS if n in ORDINARY or n in named]
+        sds = {n: BEYOND * FAULTS[n].sd for n in named}
+        trials, solutions = [t.name for t in self.trials], [t.solution for t in self.trials]
+        return list(fault_coordinates(wanted, trials, solutions, sds))
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data, so that a worker elsewhere can have it."""
+        return {
+            "problem": Problem(self.fibre, self.trials, (), {}).to_json(),
+            "weights": self.weights.tolist(),
+            "noise_f0": self.noise_f0,
+            "closure_f0": {name: values.tolist() for name, values in self.closure_f0.items()},
+        }
+
+    @staticmethod
+    def from_json(row: Mapping[str, Any]) -> System:
+        """A system from plain data."""
+        problem = Problem.from_json(row["problem"])
+        closure = {name: np.array(values, dtype=np.float64) for name, values in row["closure_f0"].items()}
+        return System(problem.fibre, problem.trials, np.array(row["weights"]), row["noise_f0"], closure)
+
+
+def _usual(parameter: str) -> float:
+    """Value of a parameter that switches a block on."""
+    from xb_muscle_ros.models.parameters import PARAMETERS
+
+    default = PARAMETERS[parameter].default
+    assert default is not None
+    return float(default)
+
+
+def _of_mechanism(entry: Entry, base: Mapping[str, float], present: Mapping[str, float]) -> list[Coordinate]:
+    """Coordinates of a mechanism; the priors of its shapes favour none of the values that it may start from."""
+    starts = entry.starting_values(base)
+    middle = {n: float(starts[0].get(n, present[n])) for n in entry.parameters}
+    for name in entry.shape:
+        tried = np.array([float(start.get(name, present[name])) for start in starts])
+        middle[name] = float(np.exp(np.mean(np.log(tried))) if np.all(tried > 0.0) else np.mean(tried))
+    return list(mechanism_coordinates(entry, middle))
+
+
+def _started(c: Coordinate, values: Mapping[str, float], present: Mapping[str, float]) -> Coordinate:
+    """A coordinate that starts where it is said to, within its bounds."""
+    value = values.get(c.label, present.get(c.name, c.start) if c.group is None else c.start)
+    return replace(c, start=min(max(value, c.lower), c.upper))
