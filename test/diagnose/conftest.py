@@ -20,8 +20,9 @@ from xb_muscle_ros.scores.noise.trials import by_windows
 from xb_muscle_ros.scores.noise.windows import Window
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 
-# Made evidence that several test modules share.
+# Made evidence that several test modules share, and makers of bags that the tests of trials have.
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "trials"))
 
 Array = npt.NDArray[np.float64]
 PCAS = (4.5, 5.8, 6.1, 6.3, 6.6)

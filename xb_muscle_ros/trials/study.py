@@ -11,6 +11,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.alike import alike
 from xb_muscle_ros.trials.bag_files import find_bags
 from xb_muscle_ros.trials.bag_reading import TrialBag
+from xb_muscle_ros.trials.between_samples import with_corners
 from xb_muscle_ros.trials.checks import check_values
 from xb_muscle_ros.trials.completing import Known, complete, counted
 from xb_muscle_ros.trials.trial import Trial
@@ -59,6 +60,8 @@ def read_study(paths: Iterable[str | Path], fibre: str, known: Known, only: str 
 def trial_of_bag(bag: TrialBag, fibre: str, known: Known, where: str) -> tuple[Trial, tuple[str, ...]]:
     """One fibre's trial, complete and checked, and lines on what is not the bag's own.
 
+    Corners of length that lie between samples are put back here, so that every command simulates the same lengths.
+
     Args:
         bag: opened.
         fibre: one of its fibres.
@@ -72,7 +75,10 @@ def trial_of_bag(bag: TrialBag, fibre: str, known: Known, where: str) -> tuple[T
     trial, notes = complete(reading, known)
     told = "f0_n" not in reading.unknown or known.f0_n is not None or known.file_f0_n != 1.0
     lines = check_values(trial, where, told, "pca" not in reading.unknown)
-    return replace(trial, warnings=(*trial.warnings, *lines)), notes
+    finer = with_corners(trial)
+    if finer is not trial:
+        notes = (*notes, "corners of length between samples were recovered")
+    return replace(finer, warnings=(*trial.warnings, *lines)), notes
 
 
 def left_out(chosen: str, others: Iterable[str]) -> str:

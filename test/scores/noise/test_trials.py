@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,11 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.scores.noise.model import NoiseModel, Source
 from xb_muscle_ros.scores.noise.trials import by_windows, completed, noise_of
 from xb_muscle_ros.scores.noise.windows import Window
-from xb_muscle_ros.trials.trial import Trial
+from xb_muscle_ros.scores.steady import steady_part
+from xb_muscle_ros.trials.readers.assembly import trial_of
+from xb_muscle_ros.trials.readers.mapping import load_mapping
+from xb_muscle_ros.trials.readers.settings import ImportSettings
+from xb_muscle_ros.trials.trial import Phase, Trial
 
 Array = npt.NDArray[np.float64]
 Windows = Callable[..., list[Window]]
@@ -114,7 +119,7 @@ def test_each_trial_by_what_it_has(made: Any) -> None:
     (even, _, loud), _ = study(made, 0, times, 0.08, 0.0195, 1.0, "exponentials")
     (uneven, *_), _ = slow(made, 1)
     uneven = replace(uneven, facts=replace(uneven.facts, trial="uneven"))
-    short = replace(even, facts=replace(even.facts, trial="short"), force_time_s=times[:9], force_n=np.ones(9))
+    short = replace(even, facts=replace(even.facts, trial="short"), force_time_s=times[:9], force_n=np.full(9, 0.2))
     model = noise_of([short, even, uneven, loud])
     assert [n.source for n in model.trials] == [Source.OTHERS, Source.WINDOW, Source.CURVE, Source.WINDOW]
     assert [n.trial for n in model.trials] == ["short", "t0", "uneven", "t2"]
@@ -212,3 +217,95 @@ def test_silence_and_too_few_samples(made: Any) -> None:
     short = replace(swung, force_time_s=trial.force_time_s[:9], force_n=trial.force_n[:9])
     with pytest.raises(UserError, match="at least 10 in one trial are needed"):
         noise_of([short])
+
+
+def test_noise_of_a_trial_without_any_goes_with_its_force(windows: Windows) -> None:
+    """Noise grows with force: a trial at full calcium is not given that of relaxed ones."""
+    known = by_windows(windows(0, 200))
+    steps = {**dict.fromkeys(known, 1e-3), "none": 1e-3}
+    alike = completed(known, steps, dict.fromkeys(steps, 0.03)).trials[-1]
+    strong = completed(known, steps, {**dict.fromkeys(known, 0.03), "none": 1.0}).trials[-1]
+    assert alike.sd_f0 == pytest.approx(completed(known, steps).trials[-1].sd_f0)
+    assert 2.0 < strong.sd_f0 / alike.sd_f0 < 12.0
+    # How much it grows is not well known, and draws say so.
+    spread = [np.log(n.members[-1].times(1.0).variance_of_mean(np.zeros(1)) ** 0.5) for n in (alike, strong)]
+    least = [np.log(n.members[0].times(1.0).variance_of_mean(np.zeros(1)) ** 0.5) for n in (alike, strong)]
+    assert spread[1] - least[1] > 1.5 * (spread[0] - least[0])
+
+
+def test_power_of_force_is_learnt_from_the_trials_that_have_noise(windows: Windows) -> None:
+    """Where noise was seen to be the same at all forces, it is taken to be the same at others."""
+    base = by_windows(windows(0, 200))["t0"]
+    known = {f"k{i}": replace(base, trial=f"k{i}") for i in range(6)}
+    levels = {f"k{i}": level for i, level in enumerate((0.02, 0.1, 0.2, 0.3, 0.4, 0.5))}
+    model = completed(known, dict.fromkeys([*known, "none"], 1e-3), {**levels, "none": 1.0})
+    assert model.trials[-1].sd_f0 == pytest.approx(base.sd_f0, rel=0.05)
+
+
+def test_noise_is_not_less_than_what_steady_force_scatters_by(made: Any) -> None:
+    """Noise that fades within 50 ms, of which curves through holds of 14 samples leave half."""
+    times = np.arange(45) * 0.006
+    phases = (Phase("isometric", 0.0, 0.09), Phase("test_stretch", 0.09, 0.17), Phase("hold", 0.17, float(times[-1])))
+    length = np.interp(times, [0.0, 0.09, 0.17, 1.0], [1.0, 1.0, 1.04, 1.04])
+    found = []
+    for seed in range(10):
+        random = np.random.default_rng(seed)
+        trials = []
+        for k in range(3):
+            quiet = made.relaxing(f"t{k}", times, 0.17, np.zeros(times.size))
+            noise = 2e-3 * made.fading_noise(random, times, 0.05, 1.0)
+            force = np.where(times < 0.09, 0.1, quiet.force_n) + noise
+            trials.append(replace(quiet, facts=replace(quiet.facts, phases=phases), length_m=length, force_n=force))
+        for trial, noise_of_trial in zip(trials, noise_of(trials).trials, strict=True):
+            inside, _ = steady_part(trial, times, trial.force_n)
+            steady_s, steady = times[inside], trial.force_n[inside]
+            line = np.polyval(np.polyfit(steady_s, steady, 1), steady_s)
+            assert noise_of_trial.sd_f0 > 0.999 * float(np.sqrt(np.sum((steady - line) ** 2) / (steady.size - 2)))
+            found.append(noise_of_trial.sd_f0 / 2e-3)
+    assert 0.35 < np.median(found) < 1.5
+
+
+@pytest.mark.parametrize("offset", [0, 3])
+def test_recordings_every_6_ms_have_the_noise_of_those_at_1_khz(shared_data: Path, offset: int) -> None:
+    """Of 18Dec2017a at five pCa, with all its rest and with 84 ms of it."""
+    trials = recorded(shared_data)
+    full = noise_of(trials)
+    for rest_s in (0.11, 0.084):
+        ratios = []
+        coarse = noise_of([thinned(trial, 6, offset, rest_s) for trial in trials])
+        assert {noise.source for noise in coarse.trials} <= {Source.CURVE, Source.WINDOW}
+        for noise, reference in zip(coarse.trials, full.trials, strict=True):
+            ratios.append(noise.sd_f0 / reference.sd_f0)
+        assert min(ratios) > 0.45
+        assert 0.6 < np.median(ratios) < 1.5
+        assert max(ratios) < 2.0
+
+
+def recorded(shared_data: Path) -> list[Trial]:
+    """Force and length of the 1 kHz recordings, in F0 and L0."""
+    scripts = Path(__file__).parents[3] / "scripts" / "datasets" / "rat_soleus_18Dec2017a.yaml"
+    settings = ImportSettings(load_mapping(scripts), "test")
+    found = []
+    for file in sorted((shared_data / "recordings" / "rat_soleus_18Dec2017a").glob("amp*.csv")):
+        prepared = settings.prepare(file)
+        for pending in prepared.reader.trials(file, prepared.mapping):
+            found.append(trial_of(pending.read(), prepared.mapping, file, True))
+    return found
+
+
+def thinned(trial: Trial, stride: int, offset: int, rest_s: float) -> Trial:
+    """Every so many samples of a trial, from so long before the first stretch."""
+    begin_s = max(trial.facts.phases[0].end_s - rest_s, 0.0)
+    kept = np.flatnonzero(trial.time_s >= begin_s)[offset::stride]
+    start_s = float(trial.time_s[kept[0]])
+    phases = tuple(replace(p, start_s=max(p.start_s, start_s)) for p in trial.facts.phases)
+    return replace(
+        trial,
+        facts=replace(trial.facts, phases=phases),
+        time_s=trial.time_s[kept],
+        length_m=trial.length_m[kept],
+        calcium_time_s=np.array([start_s]),
+        calcium_um=trial.calcium_um[:1],
+        force_time_s=trial.force_time_s[kept],
+        force_n=trial.force_n[kept],
+    )
