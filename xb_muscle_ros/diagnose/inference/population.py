@@ -1,8 +1,9 @@
 """One distribution of every effect over fibres, and what it is worth: evidence lies across fibres.
 
-Each fibre's likelihood of a mechanism's coordinate is taken as normal around its estimate. Alone, each fibre meets the
-coordinate's own prior; together they meet a common mean, which has that prior, and a spread of unknown size. The ratio
-of the two marginal likelihoods is what replication adds to the evidence of a set.
+Each fibre's likelihood of a mechanism's coordinate is taken as normal around its estimate. A fit gives an effect a
+normal prior around nothing whose width is the largest that it may plausibly have; most effects are smaller, so the
+evidence averages over narrower ones. The fibres share a centre, which has that prior, and differ by a spread of
+unknown size. What this adds to the evidence of fits that know nothing of each other is `adjustment`.
 """
 
 from __future__ import annotations
@@ -17,9 +18,9 @@ from scipy.special import logsumexp
 
 Array = npt.NDArray[np.float64]
 
-# Spreads over fibres to average over, in units of the prior's standard deviation: fibres of one muscle resemble each
-# other more than the prior knows.
-_SPREADS = (0.1, 0.2, 0.4, 0.8)
+# Widths of an effect's prior to average over, in units of its own; spreads over fibres, in units of that width: fibres
+# of one muscle resemble each other more than the prior knows.
+_SCALES, _SPREADS = (0.06, 0.25, 1.0), (0.1, 0.3, 1.0)
 
 
 class Estimate(NamedTuple):
@@ -28,12 +29,14 @@ class Estimate(NamedTuple):
     Attributes:
         value, sd: posterior.
         prior_mean, prior_sd: of its prior.
+        effect: whether it is a mechanism's effect, which is nothing at 0, rather than a shape.
     """
 
     value: float
     sd: float
     prior_mean: float
     prior_sd: float
+    effect: bool
 
     @property
     def information(self) -> float:
@@ -61,14 +64,19 @@ class Distribution(NamedTuple):
     spread: float
 
 
-def replication(estimates: Sequence[Estimate]) -> float:
-    """By how much evidence grows where the fibres' coordinates come from one distribution; 0 for one fibre."""
-    if len(estimates) < 2:
-        return 0.0
+def adjustment(estimates: Sequence[Estimate]) -> float:
+    """By how much the evidence of fits grows; estimates of one coordinate, one for each fibre."""
     alone = sum(_marginal([e], e.prior_sd, 0.0) for e in estimates)
-    sd = estimates[0].prior_sd
-    together = [_marginal(estimates, sd, spread * sd) for spread in _SPREADS]
+    together = [_marginal(estimates, sd, spread) for sd, spread in _widths(estimates)]
     return float(logsumexp(together) - math.log(len(together)) - alone)
+
+
+def _widths(estimates: Sequence[Estimate]) -> list[tuple[float, float]]:
+    """Width of the centre's prior and spread over fibres, all equally likely before anything is seen."""
+    sd = estimates[0].prior_sd
+    scales = _SCALES if estimates[0].effect else (1.0,)
+    spreads = _SPREADS if len(estimates) > 1 else (0.0,)
+    return [(scale * sd, spread * scale * sd) for scale in scales for spread in spreads]
 
 
 def _marginal(estimates: Sequence[Estimate], sd: float, spread: float) -> float:
@@ -88,16 +96,16 @@ def _marginal(estimates: Sequence[Estimate], sd: float, spread: float) -> float:
 
 def distribution(estimates: Sequence[Estimate]) -> Distribution:
     """Centre and spread over fibres, averaged over spreads by how well they explain the fibres' estimates."""
-    sd, mean = estimates[0].prior_sd, estimates[0].prior_mean
-    logs, centres, variances = [], [], []
-    for share in _SPREADS:
-        spread = share * sd
+    mean = estimates[0].prior_mean
+    logs, centres, variances, spreads = [], [], [], []
+    for sd, spread in _widths(estimates):
         logs.append(_marginal(estimates, sd, spread))
         weights = [1.0 / (1.0 / e.information + spread**2) if e.information > 0.0 else 0.0 for e in estimates]
         total = sd**-2.0 + sum(weights)
         centres.append(mean + sum(w * (e.likeliest - mean) for w, e in zip(weights, estimates, strict=True)) / total)
         variances.append(1.0 / total)
+        spreads.append(spread)
     chances = np.exp(np.array(logs) - logsumexp(logs))
     centre = float(chances @ centres)
     variance = float(chances @ (np.array(variances) + (np.array(centres) - centre) ** 2))
-    return Distribution(centre, math.sqrt(variance), float(chances @ (np.array(_SPREADS) * sd)))
+    return Distribution(centre, math.sqrt(variance), float(chances @ np.array(spreads)))

@@ -26,7 +26,7 @@ Array = npt.NDArray[np.float64]
 # Longest move of a step: of a logarithm, and of others in units of their prior's standard deviation.
 _LONGEST_LOG, _LONGEST_SD = 1.0, 3.0
 # Independent residuals resemble each other still: a misfit lasts as long as its phase.
-TOLD = 0.35
+TOLD = 0.6
 _REJECTED = 6
 
 

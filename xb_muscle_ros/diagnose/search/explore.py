@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.diagnose.inference.population import Estimate, replication
+from xb_muscle_ros.diagnose.inference.population import Estimate, adjustment
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search.descent import Descent, Fit
 from xb_muscle_ros.diagnose.search.promise import Linear, Promise, promise
@@ -93,7 +93,7 @@ class Explorer:
         self.fits: dict[Names, tuple[Fit, ...]] = {}
         self.promised: dict[Names, tuple[float, ...]] = {}
         self.unsolved: list[Names] = []
-        self._replication: dict[Names, float] = {}
+        self._adjusted: dict[Names, float] = {}
         self._linear: dict[Names, list[Linear]] = {}
         self.floors_f0 = [s.noise_f0 for s in systems]
 
@@ -133,28 +133,27 @@ class Explorer:
     def evidence(self, names: Names) -> float:
         """Logarithm of a set's probability but for a constant, all fibres together."""
         own = [-self._cost(s, f, floor) for s, f, floor in zip(self.systems, self.fits[names], self.floors_f0, strict=True)]
-        return float(sum(own)) + self.odds(names) + self.replication(names)
+        return float(sum(own)) + self.odds(names) + self.adjusted(names)
 
     def estimates(self, names: Names) -> dict[str, list[Estimate]]:
         """Coordinates of the mechanisms of a set in every fibre, by label."""
         fits = self.fits[names]
         own = [n for n in names if n not in MEASUREMENT]
+        effects = {CATALOGUE[n.value].effect for n in own}
         labels = dict.fromkeys(label for n in own for label in CATALOGUE[n.value].parameters)
         found: dict[str, list[Estimate]] = {label: [] for label in labels}
         for system, fit in zip(self.systems, fits, strict=True):
             coordinates = {c.label: c for c in system.problem(names, fit.values).coordinates}
             for label in labels:
                 c = coordinates[label]
-                found[label].append(Estimate(c.inward(fit.values[label]), fit.sds[label], c.prior_mean, c.prior_sd))
+                found[label].append(Estimate(c.inward(fit.values[label]), fit.sds[label], c.prior_mean, c.prior_sd, label in effects))
         return found
 
-    def replication(self, names: Names) -> float:
-        """What it adds to the evidence that effects are alike in all fibres."""
-        if len(self.systems) < 2:
-            return 0.0
-        if names not in self._replication:
-            self._replication[names] = sum(replication(e) for e in self.estimates(names).values())
-        return self._replication[names]
+    def adjusted(self, names: Names) -> float:
+        """What it adds to the evidence that effects are mostly small, and alike in all fibres."""
+        if names not in self._adjusted:
+            self._adjusted[names] = sum(adjustment(e) for e in self.estimates(names).values())
+        return self._adjusted[names]
 
     @staticmethod
     def odds(names: Names) -> float:

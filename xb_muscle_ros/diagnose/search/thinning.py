@@ -21,8 +21,8 @@ Array = npt.NDArray[np.float64]
 _SHORTEST_S, _GROWTH = 0.001, 0.12
 # What may be straightened, L0 and relative: 0.1 % F0 of a stiff fibre.
 _LENGTH_L0, _CALCIUM = 2e-5, 1e-3
-MEMORY_S = 0.03
-"""Residuals so far apart are as good as independent."""
+MEMORY_S, _SLOWING = 0.03, 0.5
+"""Residuals so far apart are as good as independent right after a corner; later by this share of the time since more."""
 
 
 class Thinned(NamedTuple):
@@ -39,7 +39,7 @@ class Thinned(NamedTuple):
 
 def thinned(trial: FitTrial) -> Thinned:
     """The trial at the times that tell; one sampled coarsely stays as it is."""
-    kept = _kept(trial)
+    kept, corners_s = _kept(trial)
     edges = trial.time_s[kept]
     first, last = trial.force_time_s[0], trial.force_time_s[-1]
     # A sample belongs to the step that it ends; those before the first step to the first.
@@ -49,7 +49,8 @@ def thinned(trial: FitTrial) -> Thinned:
     time_s = np.add.reduceat(trial.force_time_s, starts) / counts
     force = np.add.reduceat(trial.measured_f0, starts) / counts
     step_s = (last - first) / max(trial.force_time_s.size - 1, 1)
-    weights = np.minimum(counts * step_s / MEMORY_S, 1.0)
+    since_s = time_s - corners_s[np.clip(np.searchsorted(corners_s, time_s, side="right") - 1, 0, corners_s.size - 1)]
+    weights = np.minimum(counts * step_s / (MEMORY_S + _SLOWING * np.maximum(since_s, 0.0)), 1.0)
     made = replace(
         trial,
         time_s=edges,
@@ -61,10 +62,11 @@ def thinned(trial: FitTrial) -> Thinned:
     return Thinned(made, weights * trial.weight)
 
 
-def _kept(trial: FitTrial) -> npt.NDArray[np.intp]:
-    """Indices of the input's samples that are kept."""
+def _kept(trial: FitTrial) -> tuple[npt.NDArray[np.intp], Array]:
+    """Indices of the input's samples that are kept, and times of its corners, s."""
     t, length, calcium = trial.time_s, trial.length_l0, trial.calcium_um
     kept, here, corner, n = [0], 0, float(t[0]), t.size
+    corners = [corner]
     while here < n - 1:
         longest = max(_SHORTEST_S, _GROWTH * (t[here] - corner))
         end = max(here + 1, int(np.searchsorted(t, t[here] + longest + 1e-9, side="right")) - 1)
@@ -75,9 +77,11 @@ def _kept(trial: FitTrial) -> npt.NDArray[np.intp]:
             corner = float(t[here])
             end = max(here + 1, int(np.searchsorted(t, t[here] + _SHORTEST_S + 1e-9, side="right")) - 1)
             reach = end
+        if corner != corners[-1]:
+            corners.append(corner)
         here = reach
         kept.append(here)
-    return np.array(kept)
+    return np.array(kept), np.array(corners)
 
 
 def _straight(t: Array, length: Array, calcium: Array, here: int, end: int) -> int:
