@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-import functools
 import math
 import types
 import typing
@@ -70,18 +69,14 @@ def _encoded(value: object) -> object:
     raise TypeError(f"a {type(value).__name__} has no place in a diagnosis")
 
 
-@functools.cache
-def _hints(kind: Any) -> dict[str, Any]:
-    return typing.get_type_hints(kind)
-
-
 def _record(kind: type[T], row: object, where: str) -> T:
     if not isinstance(row, Mapping):
         raise _wrong(where, row, "an object")
     given: dict[str, Any] = {}
+    hints = typing.get_type_hints(kind)
     for field in dataclasses.fields(kind):  # type: ignore[arg-type]  # every record is a dataclass
         if field.name in row:
-            given[field.name] = _decoded(_hints(kind)[field.name], row[field.name], f"{where}: {field.name}")
+            given[field.name] = _decoded(hints[field.name], row[field.name], f"{where}: {field.name}")
         elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
             raise UserError(f"{where}: {field.name} is missing; {_AGAIN}")
     return kind(**given)
