@@ -20,7 +20,12 @@ setup(
     maintainer="xb_muscle_ros maintainers",
     maintainer_email="maintainers@users.noreply.github.com",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed"], f"{NAME}.bench": ["*.c"], f"{NAME}.plant": ["*.xml"]},
+    package_data={
+        NAME: ["py.typed"],
+        f"{NAME}.bench": ["*.c"],
+        f"{NAME}.diagnose.report": ["*.css", "templates/*.j2"],
+        f"{NAME}.plant": ["*.xml"],
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -38,6 +43,7 @@ setup(
         "scipy>=1.11",
         "numba>=0.58",
         "matplotlib>=3.6",
+        "jinja2>=3.0",
         "PyYAML>=6.0",
         "sympy>=1.12",
         "tqdm>=4.64",

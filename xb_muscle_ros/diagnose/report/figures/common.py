@@ -1,0 +1,159 @@
+"""What the figures of a diagnosis share: size, marks of base and answer, labels that may hold anything, and SVG."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import math
+import re
+import textwrap
+import warnings
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
+from xb_muscle_ros.figures.style import DATA, MODEL, SECOND
+
+Array = npt.NDArray[np.float64]
+Key = tuple[str, str]
+"""Fibre and trial."""
+
+WIDTH_MM = 178.0
+"""Between the margins of an A4 page."""
+DASHED: Any = (0, (4, 1.6))
+BASE_LINE: dict[str, Any] = {"color": SECOND, "linestyle": DASHED, "linewidth": 1.0, "label": "base model"}
+ANSWER_LINE: dict[str, Any] = {"color": MODEL, "linewidth": 1.0, "label": "answer"}
+DATA_LINE: dict[str, Any] = {"color": DATA, "linewidth": 1.8, "label": "measured", "solid_capstyle": "round"}
+BASE_DOT: dict[str, Any] = {
+    "marker": "o", "markerfacecolor": "white", "markeredgecolor": SECOND, "linestyle": "none", "label": "base model",
+}  # fmt: skip
+ANSWER_DOT: dict[str, Any] = {"marker": "o", "color": MODEL, "linestyle": "none", "label": "answer"}
+_BINS = 450
+_NAME = 26
+
+
+class Figure(NamedTuple):
+    """A figure as the page has it.
+
+    Attributes:
+        svg: self-contained.
+        caption: what is to be seen, and what is not shown.
+        alternative: in a few words, for those who do not see it.
+    """
+
+    svg: str
+    caption: str
+    alternative: str
+
+
+def label(text: object, most: int = 200) -> str:
+    """Text as Matplotlib may draw it: printable, one line, no mathematics, shortened in the middle."""
+    line = re.sub(r"\s+", " ", "".join(c if c.isprintable() else " " for c in str(text))).strip()
+    if len(line) > most:
+        head = (most - 1) * 2 // 3
+        line = f"{line[:head]}…{line[len(line) - (most - 1 - head) :]}"
+    return line.replace("\\", "\u29f5").replace("$", r"\$")
+
+
+def wrapped(text: object, width: int, lines: int = 2) -> str:
+    """Text in lines of so many characters, the last one shortened."""
+    parts = textwrap.wrap(label(text), width, break_on_hyphens=False)
+    if len(parts) > lines:
+        parts = [*parts[: lines - 1], label(" ".join(parts[lines - 1 :]), width)]
+    return "\n".join(parts)
+
+
+def key(row: Any) -> Key:
+    """Of anything with a fibre and a trial."""
+    return row.fibre, row.trial
+
+
+def trial_labels(d: Diagnosis) -> dict[Key, str]:
+    """Every trial with its pCa, and its fibre where there are several: the same in every figure.
+
+    Names go without what all of a fibre begin with, then are shortened in the middle; what is alike is numbered.
+    """
+    found: dict[Key, str] = {}
+    for fibre in dict.fromkeys(t.fibre for t in d.trials):
+        rows = [t for t in d.trials if t.fibre == fibre]
+        names = _short([label(t.trial, 10_000) for t in rows])
+        of = f"{label(fibre, 14)} " if len(d.fibres) > 1 else ""
+        found |= {key(t): of + name + _pca(t.pca) for t, name in zip(rows, names, strict=True)}
+    return found
+
+
+def _short(names: list[str]) -> list[str]:
+    if len(names) > 1:
+        alike = itertools.takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
+        shared = names[0][: len(list(alike))]
+        shared = shared[: max((shared.rfind(mark) + 1 for mark in "_- ."), default=0)]
+        names = [name[len(shared) :] or name for name in names]
+    short = [label(name, _NAME) for name in names]
+    return [f"{k + 1}: {label(name, _NAME - 4)}" if short.count(name) > 1 else name for k, name in enumerate(short)]
+
+
+def _pca(value: float | None) -> str:
+    if value is None or not math.isfinite(value):
+        return ""
+    text = f"{value:g}"
+    return f"  pCa {text if '.' in text else text + '.0'}"
+
+
+def by_activation(rows: Sequence[OfTrial]) -> list[OfTrial]:
+    """From low to high calcium within each fibre; those without pCa last."""
+    order = {fibre: k for k, fibre in enumerate(dict.fromkeys(t.fibre for t in rows))}
+    return sorted(rows, key=lambda t: (order[t.fibre], t.pca is None, -(t.pca or 0.0)))
+
+
+def thinned(time: Array, values: Array) -> tuple[Array, Array]:
+    """Lowest and highest sample of each of 450 spans: what a print can show of a long record, no peak lost."""
+    if time.size <= 4 * _BINS:
+        return time, values
+    edges = np.linspace(0, time.size, _BINS + 1).astype(int)
+    keep = {0, time.size - 1}
+    for first, last in itertools.pairwise(edges):
+        part = values[first:last]
+        if np.any(np.isfinite(part)):
+            keep |= {int(first + np.nanargmin(part)), int(first + np.nanargmax(part))}
+    chosen = np.array(sorted(keep))
+    return time[chosen], values[chosen]
+
+
+def finite(values: Iterable[float | None]) -> list[float]:
+    """Those that are numbers."""
+    return [float(v) for v in values if v is not None and math.isfinite(v)]
+
+
+def quiet_rows(axis: Any) -> None:
+    """Rows of dots or bars: faint lines along them, no axis at their side."""
+    axis.grid(axis="y", color="#ececec", linewidth=0.6)
+    axis.set_axisbelow(True)
+    axis.tick_params(axis="y", length=0)
+    axis.spines["left"].set_visible(False)
+
+
+def shown_of(shown: int, total: int, what: str, which: str) -> str:
+    """What a figure leaves out, as a sentence; empty where that is nothing."""
+    return "" if shown >= total else f" {shown} of {total} {what} shown: {which}."
+
+
+def unique(handles: Iterable[Any]) -> list[Any]:
+    """Handles of a legend, one for each label."""
+    return list({handle.get_label(): handle for handle in handles}.values())
+
+
+def svg(made: Any) -> str:
+    """A figure as SVG that needs no fonts and is the same for the same data."""
+    import matplotlib as mpl
+
+    text = io.StringIO()
+    with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": "xb_muscle"}), warnings.catch_warnings():
+        # Names may be in any script; the page beside the figure spells them in the reader's fonts.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        made.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+    drawn = text.getvalue()
+    # Without the document type, which names a file elsewhere.
+    return drawn[drawn.index("<svg") :]

@@ -1,0 +1,129 @@
+"""Measured force, both models, and what each component of the answer adds to it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.diagnose.report import phrases as say
+from xb_muscle_ros.diagnose.report.figures.common import (
+    ANSWER_LINE,
+    BASE_LINE,
+    DATA_LINE,
+    WIDTH_MM,
+    Figure,
+    finite,
+    key,
+    shown_of,
+    svg,
+    thinned,
+    trial_labels,
+    unique,
+    wrapped,
+)
+from xb_muscle_ros.diagnose.report.traces import TrialTraces
+from xb_muscle_ros.diagnose.result import Component, Diagnosis, Kind, OfTrial
+from xb_muscle_ros.figures.style import MODEL, SECOND, figure
+
+_TRIALS, _PARTS = 3, 6
+_LENGTH_MM, _FORCE_MM, _PART_MM, _RESIDUAL_MM = 9.0, 34.0, 13.5, 17.0
+
+
+def chosen_trials(d: Diagnosis, traces: Sequence[TrialTraces]) -> list[tuple[OfTrial, TrialTraces]]:
+    """Trials in which the answer takes most off the square of the error, each of another solution where it can be."""
+    of = {key(t): t for t in traces}
+    rows = [t for t in d.trials if key(t) in of and len(finite((t.before_rmsd_f0, t.after_rmsd_f0))) == 2]
+    rows.sort(key=lambda t: t.after_rmsd_f0**2 - t.before_rmsd_f0**2)
+    first: list[OfTrial] = []
+    for t in rows:
+        if t.pca not in [other.pca for other in first]:
+            first.append(t)
+    picked = [*first, *(t for t in rows if t not in first)][:_TRIALS]
+    picked.sort(key=lambda t: (t.pca is None, -(t.pca or 0.0)))
+    return [(t, of[key(t)]) for t in picked]
+
+
+def draw_parts(d: Diagnosis, traces: Sequence[TrialTraces]) -> Figure | None:
+    """Columns of trials: length, force, one panel for each component, residual; None without traces."""
+    chosen = chosen_trials(d, traces)
+    if not chosen:
+        return None
+    parts = [c for c in d.components if any(c.name in t.without_f0 for _, t in chosen)]
+    shown = parts[:_PARTS]
+    heights = (_LENGTH_MM, _FORCE_MM, *(_PART_MM for _ in shown), _RESIDUAL_MM)
+    with figure(WIDTH_MM, sum(heights) + 24.0) as made:
+        axes = made.subplots(len(heights), len(chosen), squeeze=False, sharex="col", height_ratios=heights)
+        handles: list[Any] = []
+        labels = trial_labels(d)
+        for column, (row, t) in zip(axes.T, chosen, strict=True):
+            handles += _column(column, t, shown)
+            column[0].set_title(wrapped(labels[key(row)], 36, 1), loc="left", fontsize=7.5)
+        _same_scale(axes[2:-1])
+        _same_scale(axes[-1:])
+        _labels(axes, shown)
+        made.legend(handles=unique(handles), loc="outside upper center", ncols=3, frameon=False)
+        return Figure(
+            svg(made), _caption(d, shown, len(parts), len(chosen)), "Force and what each component of the answer adds"
+        )
+
+
+def _caption(d: Diagnosis, shown: Sequence[Component], parts: int, trials: int) -> str:
+    adds = (
+        " Then what each component adds: force of the answer less that with this component's effect set to nothing, "
+        "all else as fitted; the same scale for all, artefacts hatched."
+        if shown
+        else " The answer adds no component."
+    )
+    several = " of any fibre" if len(d.fibres) > 1 else ""
+    return (
+        f"Trials{several} in which the answer takes most off the error, fitted to all trials. Top: length change; "
+        f"below, measured force (grey), base model (dashed) and answer (solid).{adds} Bottom: measured less model."
+        f"{shown_of(len(shown), parts, 'components', 'the most probable')}"
+        f"{shown_of(trials, len(d.trials), 'trials', 'of different solutions where there are any')}"
+    )
+
+
+def _column(column: Sequence[Any], t: TrialTraces, shown: Sequence[Component]) -> list[Any]:
+    column[0].plot(*thinned(t.time_s, 100.0 * t.length_l0), color="black", linewidth=0.9)
+    column[0].margins(y=0.15)
+    handles = column[1].plot(*thinned(t.time_s, t.measured_f0), **DATA_LINE)
+    for axis in column[2:]:
+        axis.axhline(0.0, color="black", linewidth=0.5)
+    for values, look in ((t.before_f0, BASE_LINE), (t.after_f0, ANSWER_LINE)):
+        handles += column[1].plot(*thinned(t.time_s, values), **look)
+        column[-1].plot(*thinned(t.time_s, 100.0 * (t.measured_f0 - values)), **look)
+    for axis, c in zip(column[2:-1], shown, strict=True):
+        if c.name not in t.without_f0:
+            axis.text(0.5, 0.5, "not in this fibre", transform=axis.transAxes, ha="center", va="center", fontsize=7)
+            continue
+        time_s, adds = thinned(t.time_s, 100.0 * t.adds_f0(c.name))
+        mechanism = c.kind is Kind.MECHANISM
+        axis.fill_between(
+            time_s, 0.0, adds, facecolor=MODEL if mechanism else "white", edgecolor=MODEL if mechanism else SECOND,
+            alpha=0.35 if mechanism else 1.0, hatch=None if mechanism else "/////", linewidth=0.0,
+        )  # fmt: skip
+        axis.plot(time_s, adds, color=MODEL if mechanism else SECOND, linewidth=0.9)
+    return list(handles)
+
+
+def _same_scale(rows: Any) -> None:
+    """One scale around zero for all panels of some rows."""
+    ends = [abs(end) for axis in np.ravel(rows) for end in axis.get_ylim()]
+    for axis in np.ravel(rows):
+        axis.set_ylim(-max(ends), max(ends))
+
+
+def _labels(axes: Any, shown: Sequence[Component]) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    names = ["Length\n(% L$_0$)", "Force (F$_0$)", *(wrapped(say.title(c), 24, 3) + "\n(% F$_0$)" for c in shown)]
+    for name, row in zip([*names, "Residual\n(% F$_0$)"], axes, strict=True):
+        row[0].set_ylabel(name, rotation=0, ha="right", va="center", fontsize=7)
+    for column in axes.T:
+        for k, axis in enumerate(column):
+            axis.yaxis.set_major_locator(MaxNLocator(5 if k == 1 else 2))
+            axis.tick_params(length=2.5, width=0.6, pad=2, labelsize=7)
+        column[-1].xaxis.set_major_locator(MaxNLocator(5))
+        column[-1].set_xlabel("Time (s)")

@@ -1,0 +1,162 @@
+"""The page of a diagnosis: one HTML document that needs no other file and no network."""
+
+from __future__ import annotations
+
+import base64
+import functools
+import re
+from collections.abc import Sequence
+from importlib import resources
+from typing import Any, NamedTuple
+
+import jinja2
+from markupsafe import Markup, escape
+
+from xb_muscle_ros.diagnose.report import phrases as say
+from xb_muscle_ros.diagnose.report.figures.common import Figure, trial_labels
+from xb_muscle_ros.diagnose.report.glossary import GLOSSARY
+from xb_muscle_ros.diagnose.report.prose import headline, summary
+from xb_muscle_ros.diagnose.report.traces import TrialTraces
+from xb_muscle_ros.diagnose.result import NAMED, Diagnosis, Nuisance
+from xb_muscle_ros.diagnose.words import digits, family_words, human, joined, meaning, phase_words
+
+_HERE = "xb_muscle_ros.diagnose.report"
+_UNITS = re.compile(r"\b([FL])0\b")
+# A number does not part from its unit or its sign.
+_TIED = re.compile(r"(?<=\d) (?=%|ms\b|s\b)|(?<=%) (?=[FL]0)|(?<=[<>±]) (?=\d)|(?<=&[lg]t;) (?=\d)")
+MOST_ROWS = 40
+"""Rows of a table of trials, errors or places; the rest is in `diagnosis.json`, and said to be."""
+# Candidates below this probability are listed in one line.
+_LEAST = 0.05
+
+
+class Shown(NamedTuple):
+    """A figure in its place on the page.
+
+    Attributes:
+        number: from 1 on.
+        source: data URI.
+        figure: with its caption.
+    """
+
+    number: int
+    source: str
+    figure: Figure
+
+
+def as_html(d: Diagnosis, traces: Sequence[TrialTraces]) -> str:
+    """The report.
+
+    Args:
+        d: the diagnosis.
+        traces: of its trials; figures of forces show those that there are.
+    """
+    page: str = _environment().get_template("page.html.j2").render(_context(d, traces))
+    return page
+
+
+def source(name: str) -> str:
+    """A template or the style sheet, as installed with the package.
+
+    Raises:
+        FileNotFoundError: the package was installed without it.
+    """
+    place = resources.files(_HERE)
+    for part in name.split("/"):
+        place = place.joinpath(part)
+    return place.read_text(encoding="utf-8")
+
+
+@functools.cache
+def _environment() -> jinja2.Environment:
+    made = jinja2.Environment(
+        loader=jinja2.FunctionLoader(lambda name: source(f"templates/{name}")),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        finalize=_printable,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters.update(
+        f0=lambda value: say.force(value, ""), prob=say.probability, share=say.share, gain=say.gain, num=say.number,
+        estimate=say.estimate, title=say.title, human=human, meaning=meaning, family=family_words, phase=phase_words,
+        units=_units, joined=joined, signed=_signed, p=_p_value,
+    )  # fmt: skip
+    return made
+
+
+def _context(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Any]:
+    likely = [c for c in d.components if c.inclusion_probability >= _LEAST]
+    return {
+        "d": d,
+        "headline": headline(d),
+        "summary": summary(d),
+        "figures": _figures(d, traces),
+        "glossary": GLOSSARY,
+        "style": Markup(source("report.css")),
+        "likely": likely,
+        "unlikely": [c for c in d.components if c not in likely],
+        "nuisances": sorted(d.nuisances, key=lambda n: -_beyond(n)),
+        "beyond": _beyond,
+        "labels": {f"{fibre}\n{trial}": text for (fibre, trial), text in trial_labels(d).items()},
+        "named": NAMED,
+        "most": MOST_ROWS,
+        "several": len(d.fibres) > 1,
+    }
+
+
+def _figures(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Shown]:
+    """Figures that there are, numbered in the order of the page."""
+    # Matplotlib takes long to load, and a diagnosis that fails early needs none of it.
+    from xb_muscle_ros.diagnose.report.figures.before_after import draw_before_after
+    from xb_muscle_ros.diagnose.report.figures.fibres import draw_fibres
+    from xb_muscle_ros.diagnose.report.figures.laws import draw_laws
+    from xb_muscle_ros.diagnose.report.figures.parts import draw_parts
+    from xb_muscle_ros.diagnose.report.figures.probabilities import draw_probabilities
+    from xb_muscle_ros.diagnose.report.figures.remains import draw_map
+
+    drawn = {
+        "before_after": draw_before_after(d, traces),
+        "probabilities": draw_probabilities(d),
+        "parts": draw_parts(d, traces),
+        "fibres": draw_fibres(d),
+        "map": draw_map(d),
+        "laws": draw_laws(d),
+    }
+    there = {name: figure for name, figure in drawn.items() if figure is not None}
+    return {name: Shown(k, _uri(figure.svg), figure) for k, (name, figure) in enumerate(there.items(), start=1)}
+
+
+def _uri(svg: str) -> str:
+    return "data:image/svg+xml;base64," + base64.b64encode(svg.encode("utf-8")).decode("ascii")
+
+
+def _printable(value: object) -> object:
+    """What no page may hold becomes U+FFFD; what is unknown a dash."""
+    if value is None:
+        return say.NOTHING
+    if not isinstance(value, str) or isinstance(value, Markup):
+        return value
+    kept = "".join(c if c >= " " or c in "\t\n" else "\ufffd" for c in value)
+    return kept.encode("utf-8", "replace").decode("utf-8")
+
+
+def _units(text: object) -> Markup:
+    """Words of the tool's own, with F0 and L0 as physiologists print them."""
+    told = _TIED.sub("\u00a0", str(escape(_printable(str(text)))))
+    return Markup(_UNITS.sub(r"\1<sub>0</sub>", told))
+
+
+def _signed(value_f0: float) -> str:
+    text = say.force(value_f0, "")
+    return f"+{text}" if value_f0 > 0.0 and text != say.NOTHING else text
+
+
+def _p_value(value: float) -> str:
+    return "< 0.001" if 0.0 <= value < 0.001 else digits(value) if value == value else say.NOTHING
+
+
+def _beyond(n: Nuisance) -> float:
+    """Size of an ordinary error against what is ordinary."""
+    ratio = abs(n.value) / n.prior_sd if n.prior_sd > 0.0 else 0.0
+    return ratio if ratio == ratio else 0.0

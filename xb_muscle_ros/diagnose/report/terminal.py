@@ -1,0 +1,62 @@
+"""A diagnosis as lines for a terminal: headline, summary, table of components, then what else has to be said."""
+
+from __future__ import annotations
+
+import textwrap
+
+from xb_muscle_ros.diagnose.report import phrases as say
+from xb_muscle_ros.diagnose.report.prose import headline, summary
+from xb_muscle_ros.diagnose.result import NAMED, Component, Diagnosis, Kind
+
+_HEAD = ("component", "probability", "share", "held-out gain ± se", "parameter [95 %]", "does")
+_RIGHT = (1, 2)
+_MOST_ROWS, _NAME = 8, 38
+# Less probable ones are only counted, unless there is nothing else.
+_LEAST = 0.05
+
+
+def terminal_text(d: Diagnosis, width: int = 100) -> str:
+    """Lines of at most `width` characters, but for the table, which is as wide as its names."""
+    lines = [*_wrapped(headline(d), width), "", *_wrapped(" ".join(summary(d)), width)]
+    if d.components:
+        lines += ["", *_table(d)]
+    for name, told in (("warning", d.warnings), ("missing", d.missing), ("note", d.notes)):
+        if told:
+            lines.append("")
+        for line in told:
+            lines += _wrapped(f"{name}: {line}", width, "  ")
+    return "\n".join(lines)
+
+
+def _wrapped(text: str, width: int, indent: str = "") -> list[str]:
+    return textwrap.wrap(text, width, subsequent_indent=indent, break_on_hyphens=False)
+
+
+def _table(d: Diagnosis) -> list[str]:
+    likely = [c for c in d.components if c.inclusion_probability >= _LEAST] or list(d.components[:1])
+    # Whatever is named is listed, however many there are.
+    shown = likely[: max(_MOST_ROWS, sum(c.inclusion_probability >= NAMED for c in d.components))]
+    rows = [_HEAD] + [row for c in shown for row in _rows(c)]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(_HEAD))]
+    lines = []
+    for row in rows:
+        cells = [
+            f"{cell:>{w}}" if k in _RIGHT else f"{cell:<{w}}"
+            for k, (cell, w) in enumerate(zip(row, widths, strict=True))
+        ]
+        lines.append("  ".join(cells).rstrip())
+    lines.insert(1, "  ".join("-" * w for w in widths))
+    left = len(d.components) - len(shown)
+    return [*lines, f"{len(shown)} of {len(d.components)} candidates shown"] if left else lines
+
+
+def _rows(c: Component) -> list[tuple[str, ...]]:
+    """A line for a component, and one for each further line of its name or further parameter."""
+    names = _wrapped(say.title(c) + (" (artefact)" if c.kind is Kind.ARTEFACT else ""), _NAME)
+    told = [f"{p.name} {say.estimate(p)}{' at bound' if p.at_bound else ''}" for p in c.parameters]
+    first = (say.probability(c.inclusion_probability), say.share(c.share_of_mismatch), say.gain(c.heldout_gain))
+    out: list[tuple[str, ...]] = []
+    for k in range(max(len(names), len(told), 1)):
+        name, parameter = (names[k] if k < len(names) else ""), (told[k] if k < len(told) else "")
+        out.append((name, *(first if k == 0 else ("", "", "")), parameter, c.direction if k == 0 else ""))
+    return out
