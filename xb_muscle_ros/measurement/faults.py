@@ -10,8 +10,8 @@ What real sets show of the ordinary ones (how, and by which script: docs/evidenc
   bag to bag where trials in between are not there.
 - ``force_offset``: resting force at one length, from trial to trial, SD 0.5 % F0 in cat soleus, 0.03 to 0.18 % in rat
   gastrocnemius; isometric force of one solution 0.01 to 0.7 %; fits of rat soleus 0.5 %.
-- ``time_shift``: fits find -1.1 ms where length was recorded beside force. Where it was not (`rat_soleus_fibres`, good to
-  2 ms), -2.4 to -3.9 ms: give such sets more room.
+- ``time_shift``: fits find -1.1 ms where length was recorded beside force. Where it was not (`rat_soleus_fibres`, good
+  to 2 ms), -2.4 to -3.9 ms: give such sets more room.
 """
 
 from __future__ import annotations
