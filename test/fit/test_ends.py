@@ -15,8 +15,9 @@ from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.ends import quadratic_ends
 from xb_muscle_ros.fit.features import F0_ANCHOR
 from xb_muscle_ros.fit.problem import Problem
-from xb_muscle_ros.fit.report import as_json, table
+from xb_muscle_ros.fit.report import as_json
 from xb_muscle_ros.fit.run import Settings, fit
+from xb_muscle_ros.fit.table import table
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.made import made

@@ -13,9 +13,10 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.coordinates import FITTED, Choice, free_names, parameter_coordinates
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.problem import Problem
-from xb_muscle_ros.fit.report import as_json, table
+from xb_muscle_ros.fit.report import as_json
 from xb_muscle_ros.fit.run import Settings, _starts, fit
 from xb_muscle_ros.fit.start import begun, held, null_lines, start_lines
+from xb_muscle_ros.fit.table import table
 from xb_muscle_ros.models.catalogue import CATALOGUE, without_effect_line
 from xb_muscle_ros.models.fibre_file import Fibre, borrowed_line, changed, load_fibre
 from xb_muscle_ros.models.muscle import Muscle

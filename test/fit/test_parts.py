@@ -13,7 +13,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.fit.calibration import calibrated_force
 from xb_muscle_ros.fit.coordinates import Choice, fault_coordinates, parameter_coordinates, population_choices
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.features import F0_ANCHOR, Feature, measured, simulated
@@ -212,16 +211,6 @@ def test_features_of_a_simulation(truth: Fibre) -> None:
 def test_features_that_cannot_be(change: dict[str, object]) -> None:
     with pytest.raises(UserError, match="feature"):
         replace(F0_ANCHOR, **change)  # type: ignore[arg-type]
-
-
-def test_calibration_finds_the_shift_of_a_held_out_solution(truth: Fibre, made_trials: Maker) -> None:
-    prepared = fit_trials(made_trials((6.3,), 1, pca_shift=-0.05), [True])
-    shift = fault_coordinates(["pca_shift"], [], ["pCa 4.5"], {})
-    problem = Problem(truth, prepared, shift, {})
-    found = calibrated_force(problem, problem.start, prepared[0])
-    assert found is not None
-    assert found[1] == pytest.approx(-0.05, abs=5e-3)
-    assert np.sqrt(np.mean((found[0] - prepared[0].measured_f0) ** 2)) < 3e-3
 
 
 def test_stretches_of_a_fibre_that_has_run_down_are_left_out(tmp_path: Path) -> None:

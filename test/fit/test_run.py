@@ -15,8 +15,9 @@ from xb_muscle_ros.fit import run as fit_run
 from xb_muscle_ros.fit.coordinates import Choice, fault_coordinates, parameter_coordinates
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.problem import Problem
-from xb_muscle_ros.fit.report import as_json, mean_rmsd, table, write_fitted
+from xb_muscle_ros.fit.report import as_json, mean_rmsd, write_fitted
 from xb_muscle_ros.fit.run import Fitted, Settings, fit
+from xb_muscle_ros.fit.table import table
 from xb_muscle_ros.models.fibre_file import Fibre, load_fibre
 from xb_muscle_ros.trials.trial import Trial
 from xb_muscle_ros.work import Options

@@ -20,7 +20,10 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import matching, refuse_older
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from xb_muscle_ros.fit.coordinates import Choice
+    from xb_muscle_ros.fit.data import FitTrial
     from xb_muscle_ros.fit.problem import Problem
     from xb_muscle_ros.models.fibre_file import Fibre
     from xb_muscle_ros.trials.trial import Trial
@@ -31,7 +34,8 @@ if TYPE_CHECKING:
 _WRITTEN = (r"fit\.json", r"trials(_\d+)?\.(png|pdf)", r"(features|profiles|correlation)\.(png|pdf)")
 _EPILOG = """RULE is KEY=VALUE with KEY one of trial (VALUE may have * and ?), pca, amplitude (L0), recovery (s): a
 trial meets it within what such conditions vary by. Faults of the measurement are pca_shift (per solution), length_gain,
-run_down, time_shift, transducer_lag (per study), force_offset and force_drift (per trial)."""
+run_down, time_shift, transducer_lag (per study), force_offset and force_drift (per trial); ordinary are all but
+transducer_lag and force_drift."""
 
 
 def add(subparsers: Subparsers) -> None:
@@ -66,10 +70,15 @@ def add(subparsers: Subparsers) -> None:
         "--prior", nargs="+", default=[], metavar="NAME=MEAN:SD",
         help="prior; of positive parameters log-normal with SD as a share; inf: none (default: a factor of e)",
     )  # fmt: skip
-    parser.add_argument(
-        "--nuisance", nargs="+", default=[], metavar="FAULT[=SD]",
-        help="faults of the measurement to fit beside the parameters; 'all' for all of them",
+    errors = parser.add_mutually_exclusive_group()
+    errors.add_argument(
+        "--nuisance", nargs="+", metavar="FAULT[=SD]",
+        help="faults of the measurement to fit beside the parameters; 'ordinary' for those that every set has a little "
+        "of (default), 'all' for all of them, 'none' for none",
     )  # fmt: skip
+    errors.add_argument(
+        "--no-nuisance", dest="nuisance", action="store_const", const=["none"], help="the same as --nuisance none"
+    )
     parser.add_argument(
         "--prior-fibers",
         nargs="+",
@@ -98,8 +107,9 @@ def add(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, print the tables, write the files."""
-    from xb_muscle_ros.fit.report import as_json, table, write_fitted, write_json
+    from xb_muscle_ros.fit.report import as_json, write_fitted, write_json
     from xb_muscle_ros.fit.run import Settings, fit
+    from xb_muscle_ros.fit.table import table
     from xb_muscle_ros.trials.bag_files import remove_results
 
     out = arguments.out
@@ -176,7 +186,8 @@ def _problem(arguments: argparse.Namespace, given: Fibre, trials: list[Trial]) -
     weights = {name: _number(value, f"--weight {name}") for name, value in _pairs(arguments.weight, "--weight")}
     prepared = fit_trials(trials, out, arguments.window == "whole", weights)
     training = [t for t in prepared if not t.held_out and t.weight > 0.0]
-    names, sds = _nuisances(arguments.nuisance)
+    names, sds, lines = _nuisances(arguments.nuisance, training)
+    notes += lines
     choices = _choices(arguments)
     if arguments.prior_fibers:
         others = [load_fibre(name, fibre.model, for_fit=True) for name in arguments.prior_fibers]
@@ -207,21 +218,34 @@ def _start(
     return replace(fibre, name=trials[0].facts.fibre if trials else arguments.features_of), lines
 
 
-def _nuisances(given: list[str]) -> tuple[list[str], dict[str, float]]:
+def _nuisances(given: list[str] | None, training: Sequence[FitTrial]) -> tuple[list[str], dict[str, float], list[str]]:
+    """Names of faults, standard deviations of those that the user gave one, and lines on what is left out."""
+    from xb_muscle_ros.fit.ordinary import shown_by
     from xb_muscle_ros.measurement.faults import FAULTS
 
+    ordinary, unseen = shown_by(training)
+    sets: dict[str, Sequence[str]] = {"all": tuple(FAULTS), "ordinary": ordinary, "none": ()}
     names: list[str] = []
     sds: dict[str, float] = {}
-    for text in given:
+    for text in ["ordinary"] if given is None else given:
         name, equals, sd = text.partition("=")
-        if name == "all" and equals:
-            raise UserError(f"--nuisance {text}: 'all' takes no SD, since each has its own unit; name them one by one")
+        if name in sets and equals:
+            raise UserError(
+                f"--nuisance {text}: '{name}' takes no SD, since each has its own unit; name them one by one"
+            )
+        if name == "none" and given is not None and len(given) > 1:
+            raise UserError("--nuisance none is given with others; give it alone")
         if name in sds:
             raise UserError(f"--nuisance {name} is given an SD twice; give it once")
-        names += list(FAULTS) if name == "all" else [name]
+        names += sets.get(name, (name,))
         if equals:
             sds[name] = _number(sd, f"--nuisance {name}")
-    return names, sds
+    left = [name for name in unseen if name not in names]
+    asked = given is None or "ordinary" in given
+    lines = (
+        [f"not fitted, since nothing in the trials shows it: {', '.join(left)}"] if asked and left and training else []
+    )
+    return names, sds, lines
 
 
 def _choices(arguments: argparse.Namespace) -> dict[str, Choice]:

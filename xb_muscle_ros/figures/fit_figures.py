@@ -23,6 +23,8 @@ _HEADROOM, _LEAST_RESIDUAL_PERCENT = 1.15, 0.1
 _LONGEST_NAME = 34
 # Up to so many coordinates a correlation matrix has room for small numbers too.
 _FEW = 10
+# An error of the measurement bears on a parameter from this correlation on.
+_BEARS = 0.3
 _KINDS = {
     "isometric_force": ("Isometric force", "F$_0$"),
     "srs_conditioning": ("SRS, unconditioned", "F$_0$/L$_0$"),
@@ -134,9 +136,16 @@ def _features(path: Path, found: Mapping[str, Any]) -> Path:
 
 
 def _correlation(path: Path, found: Mapping[str, Any]) -> Path:
-    """Correlation matrix, with numbers where they matter."""
-    names, matrix = found["correlation"]["names"], np.array(found["correlation"]["matrix"])
-    n = len(names)
+    """Correlation matrix, with numbers where they matter.
+
+    Errors of the measurement have a place where they bear on a parameter, or where nothing else was fitted.
+    """
+    matrix = np.array(found["correlation"]["matrix"])
+    parameters = np.array([row["group"] is None for row in found["parameters"]])
+    bearing = np.max(np.abs(matrix[:, parameters]), axis=1, initial=0.0 if parameters.any() else 1.0) >= _BEARS
+    shown = np.flatnonzero(parameters | bearing)
+    names, matrix = [found["correlation"]["names"][j] for j in shown], matrix[np.ix_(shown, shown)]
+    n, left = len(names), parameters.size - len(names)
     with figure(45.0 + 6.5 * n, 35.0 + 6.5 * n) as made:
         axes = made.add_subplot()
         image = axes.imshow(matrix, cmap="PuOr", vmin=-1.0, vmax=1.0)
@@ -152,6 +161,8 @@ def _correlation(path: Path, found: Mapping[str, Any]) -> Path:
                     )  # fmt: skip
         axes.spines[:].set_visible(False)
         made.colorbar(image, ax=axes, shrink=0.7, label="Correlation of estimates")
+        if left:
+            axes.set_xlabel(f"not shown: {left} errors of the measurement, below {_BEARS:g} with every parameter")
         save(made, path)
     return path
 

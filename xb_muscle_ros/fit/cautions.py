@@ -11,6 +11,7 @@ import numpy as np
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.ends import BOUND, PRIOR, UNSEEN, UNSETTLED
 from xb_muscle_ros.fit.methods import fast_form
+from xb_muscle_ros.fit.ordinary import beyond_line
 from xb_muscle_ros.fit.run import Fitted
 from xb_muscle_ros.fit.start import null_lines
 from xb_muscle_ros.fit.training import Training
@@ -40,12 +41,16 @@ def cautions(fitted: Fitted, parameters: Sequence[Mapping[str, Any]], trials: Se
     found = [
         f"{problem.coordinates[j].label} has no effect on what is fitted: its value is its start or its prior's"
         for j in idle
+        if problem.coordinates[j].group is None
     ]
+    unseen = [problem.coordinates[j].label for j in idle if problem.coordinates[j].group is not None]
+    found += [f"nothing in the data shows {', '.join(unseen)}: at the prior's mean"] if unseen else []
     found += null_lines(problem)
     for j, row in enumerate(parameters):
         if j not in idle:
             found += _of_parameter(problem.coordinates[j].label, row)
     found += _of_priors(parameters, idle)
+    found += beyond_line(parameters, trials)
     found += _twins(fitted)
     found += _of_starts(fitted)
     found += _of_grid(fitted)
@@ -120,13 +125,26 @@ def _of_priors(parameters: Sequence[Mapping[str, Any]], idle: Sequence[int]) -> 
 
 def _twins(fitted: Fitted) -> list[str]:
     coordinates, matrix = fitted.problem.coordinates, correlation(fitted.shape.covariance)
-    return [
+    pairs = [(i, j) for i in range(len(coordinates)) for j in range(i) if abs(matrix[i, j]) > _TWINS]
+    found = [
         f"{coordinates[j].label} and {coordinates[i].label} are hardly told apart (correlation {matrix[i, j]:.2f}); "
         "fix or tie one of them"
-        for i in range(len(coordinates))
-        for j in range(i)
-        if abs(matrix[i, j]) > _TWINS
+        for i, j in pairs
+        if coordinates[i].group is None and coordinates[j].group is None
     ]
+    # An error of the measurement has a prior that is real knowledge: nothing is to be fixed.
+    resting: dict[str, dict[str, None]] = {}
+    for pair in pairs:
+        errors = [coordinates[j].name for j in pair if coordinates[j].group is not None]
+        if len(errors) == 1:
+            parameter = next(coordinates[j].name for j in pair if coordinates[j].group is None)
+            resting.setdefault(parameter, {})[errors[0]] = None
+    if resting:
+        told = ", ".join(f"{name} ({', '.join(errors)})" for name, errors in resting.items())
+        found.append(
+            f"known only as well as the prior of errors of the measurement (correlation above {_TWINS:g}): {told}"
+        )
+    return found
 
 
 def _of_starts(fitted: Fitted) -> list[str]:

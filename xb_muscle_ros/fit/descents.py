@@ -18,6 +18,9 @@ from xb_muscle_ros.work import Options, run
 
 Array = npt.NDArray[np.float64]
 
+# Of finding how much of the measurement's errors priors hold.
+_ROUNDS = 2
+
 
 def start_task(task: Mapping[str, Any]) -> dict[str, Any]:
     """One descent; ``lost``, why, where the model has no solution at its start, from where nothing tells the way."""
@@ -32,10 +35,41 @@ def start_task(task: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def scale_at(problem: Problem, z: Array) -> Scale:
-    """Scale that the residuals at a point turn out to have."""
+    """Scale that the residuals at a point turn out to have.
+
+    Each parameter counts as one of what the fit had to make them small, an error of the measurement as the share of it
+    that the data tell and not its prior: dozens of them are held by their priors, and take nothing away.
+    """
     training = Training(problem)
     residual = training.force(z) - training.measured
-    return scale_of([residual[s] for s in training.slices()], z.size)
+    parts = [residual[s] for s in training.slices()]
+    scale = scale_of(parts, z.size)
+    faults = [j for j, c in enumerate(problem.coordinates) if c.group is not None]
+    if not faults:
+        return scale
+    slopes = training.slopes(z)
+    # How much the data tell depends on the scale, a little.
+    for _ in range(_ROUNDS):
+        shares = _prior_shares(Objective(training, scale), *slopes)
+        scale = scale_of(parts, z.size - float(np.sum(shares[faults])))
+    return scale
+
+
+def _prior_shares(objective: Objective, of_force: Array, of_features: Array) -> Array:
+    """Share of what is known of each coordinate that its own prior tells, shape (coordinates,).
+
+    Args:
+        objective: of the fit.
+        of_force, of_features: see `Training.slopes`.
+    """
+    sds = np.array([c.prior_sd for c in objective.training.problem.coordinates])
+    prior = np.where(np.isfinite(sds), sds**-2.0, 0.0)
+    weighted = of_force * objective.weights()[:, None]
+    h = weighted.T @ weighted + of_features.T @ of_features + np.diag(prior)
+    unit = np.sqrt(np.maximum(np.diag(h), 1e-12))
+    inverse = np.linalg.pinv(h / np.outer(unit, unit), hermitian=True)
+    shares: Array = np.clip(prior * np.diag(inverse) / unit**2, 0.0, 1.0)
+    return shares
 
 
 def descended(problem: Problem, best: Solution, scale: Scale, options: Options) -> Solution:

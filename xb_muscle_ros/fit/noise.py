@@ -108,12 +108,12 @@ def _drawn(sample: Array, n: int, random: np.random.Generator) -> Array:
     return noise
 
 
-def scale_of(residuals: Sequence[Array], moved: int) -> Scale:
+def scale_of(residuals: Sequence[Array], moved: float) -> Scale:
     """Scale of the differences that a fit left.
 
     Args:
         residuals: of each trial, F0.
-        moved: how many coordinates the fit had to make them small.
+        moved: how many coordinates the fit had to make them small; those that priors hold count for less than one.
     """
     total = sum(float(r @ r) for r in residuals)
     samples = sum(r.size for r in residuals)

@@ -1,4 +1,4 @@
-"""What a fit found, as plain data, as lines for a terminal, and as a fibre file with its provenance."""
+"""What a fit found, as plain data and as a fibre file with its provenance."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from scipy.stats import chi2
 from xb_muscle_ros import __version__
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import write_text
-from xb_muscle_ros.fit.calibration import calibrated_force
+from xb_muscle_ros.fit.calibration import calibrated_force, own_faults
 from xb_muscle_ros.fit.cautions import cautions
 from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.fit.data import FitTrial
-from xb_muscle_ros.fit.ends import PRIOR, closes, quadratic_ends
-from xb_muscle_ros.fit.problem import Problem, touches
+from xb_muscle_ros.fit.ends import closes, quadratic_ends
+from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.run import Fitted
 from xb_muscle_ros.fit.start import held, unfitted_nuisances
 from xb_muscle_ros.fit.training import Training
@@ -59,15 +59,27 @@ def trial_rows(fitted: Fitted) -> list[dict[str, Any]]:
     return rows
 
 
-def _calibrated(fitted: Fitted, trial: FitTrial) -> dict[str, float | None]:
-    """RMSD (F0) of a held-out trial once its isometric force has told its pCa shift, where the fit had such shifts."""
-    shifts = [c for c in fitted.problem.coordinates if c.name == "pca_shift"]
-    if not (trial.held_out and shifts) or any(touches(c, trial) for c in shifts):
+def _calibrated(fitted: Fitted, trial: FitTrial) -> dict[str, Any]:
+    """RMSD (F0) of a held-out trial with the faults of its own that its isometric force asks for, start and fit alike.
+
+    Empty where the fit has no such faults; RMSDs are None where nothing tells them, or the model has no solution.
+    """
+    problem = fitted.problem
+    if not (trial.held_out and own_faults(problem, trial)):
         return {}
-    found = calibrated_force(fitted.problem, fitted.best.z, trial)
-    if found is None:
-        return {"rmsd_calibrated_f0": None, "pca_shift": None}
-    return {"rmsd_calibrated_f0": float(np.sqrt(np.mean((found[0] - trial.measured_f0) ** 2))), "pca_shift": found[1]}
+    row: dict[str, Any] = {"rmsd_before_calibrated_f0": None, "rmsd_calibrated_f0": None, "own_faults": {}}
+    for key, z, known in (
+        ("rmsd_before_calibrated_f0", problem.start, False),
+        ("rmsd_calibrated_f0", fitted.best.z, True),
+    ):
+        try:
+            found = calibrated_force(problem, z, trial, known)
+        except UserError:
+            continue  # The trial's own row says so already.
+        if found.own:
+            row[key] = float(np.sqrt(np.mean((found.force_f0 - trial.measured_f0) ** 2)))
+            row["own_faults"] = dict(found.own) if known else {}
+    return row
 
 
 def _rmsds(problem: Problem, z: Array) -> list[float | None]:
@@ -86,7 +98,7 @@ def _rmsds(problem: Problem, z: Array) -> list[float | None]:
 
 def mean_rmsd(rows: Sequence[Mapping[str, Any]], held_out: bool, key: str) -> float | None:
     """Root mean square of the trials' RMSDs, F0; None where there are none."""
-    squares = [row[key] ** 2 for row in rows if row["held_out"] == held_out and row[key] is not None]
+    squares = [row[key] ** 2 for row in rows if row["held_out"] == held_out and row.get(key) is not None]
     return math.sqrt(sum(squares) / len(squares)) if squares else None
 
 
@@ -156,9 +168,11 @@ def as_json(fitted: Fitted, provenance: Mapping[str, Any], notes: Sequence[str] 
         "scale": fitted.scale._asdict(),
         "train_rmsd_f0": mean_rmsd(rows, False, "rmsd_f0"),
         "heldout_rmsd_f0": mean_rmsd(rows, True, "rmsd_f0"),
+        "heldout_rmsd_calibrated_f0": mean_rmsd(rows, True, "rmsd_calibrated_f0"),
         "before": {
             "train_rmsd_f0": mean_rmsd(rows, False, "rmsd_before_f0"),
             "heldout_rmsd_f0": mean_rmsd(rows, True, "rmsd_before_f0"),
+            "heldout_rmsd_calibrated_f0": mean_rmsd(rows, True, "rmsd_before_calibrated_f0"),
         },
         "trials": rows,
         "features": [
@@ -180,55 +194,6 @@ def as_json(fitted: Fitted, provenance: Mapping[str, Any], notes: Sequence[str] 
         ],
         "warnings": cautions(fitted, parameters, rows),
     }
-
-
-def table(found: Mapping[str, Any]) -> str:
-    """Lines for a terminal."""
-    lines = [f"{'parameter':24s} {'start':>11s} {'fitted':>11s}  {'interval':25s} unit"]
-    for row in found["parameters"]:
-        label = f"{row['name']}[{row['group']}]" if row["group"] else row["name"]
-        interval = f"{_end(row, 0)} to {_end(row, 1)}"
-        lines.append(f"{label:24s} {row['start']:11.5g} {row['value']:11.5g}  {interval:25s} {row['unit']}")
-    lines += _held_lines(found)
-    lines += ["", f"{'trial':40s} {'':9s} {'before':>8s} {'after':>8s}  RMSD, % F0"]
-    for row in found["trials"]:
-        what = "held out" if row["held_out"] else "training" if row["weight"] > 0.0 else "no weight"
-        line = f"{row['trial']:40s} {what:9s} {_percent(row['rmsd_before_f0'])} {_percent(row['rmsd_f0'])}"
-        if row.get("rmsd_calibrated_f0") is not None:
-            calibrated = _percent(row["rmsd_calibrated_f0"]).strip()
-            line += f"; {calibrated} with the pCa shift of its isometric force ({row['pca_shift']:+.3f})"
-        lines.append(line)
-    for key, what in (("train_rmsd_f0", "training"), ("heldout_rmsd_f0", "held out")):
-        if found[key] is not None:
-            lines.append(f"{'all':40s} {what:9s} {_percent(found['before'][key])} {_percent(found[key])}")
-    return "\n".join(lines)
-
-
-def _end(row: Mapping[str, Any], side: int) -> str:
-    """One end of an interval: ``<`` or ``>`` where it is open, ``~`` before one that the prior makes."""
-    what = row["interval_ended_by"][side]
-    mark = "" if closes(what) else "~" if what == PRIOR else "<>"[side]
-    return f"{mark}{row['interval'][side]:.4g}"
-
-
-def _held_lines(found: Mapping[str, Any]) -> list[str]:
-    """What was not fitted, a line for each kind; and what the marks of the intervals say, where there are some."""
-    rows = found["parameters"]
-    marks = {_end(row, side)[0] for row in rows for side in (0, 1)} & {"<", ">", "~"}
-    lines = ["< >: open, no end in the data; ~: the prior's end"] if marks else []
-    if any(row["interval_kind"] == "curvature" and row["group"] is None for row in rows):
-        lines.append("intervals are those of the curvature at the best point: profiles were left out")
-    if found["ties"]:
-        lines.append(f"tied: {', '.join(f'{a} = {b}' for a, b in found['ties'].items())}")
-    if found["held"]:
-        lines.append(f"held at their values: {', '.join(f'{n} {v:.5g}' for n, v in found['held'].items())}")
-    if found["nuisances_not_fitted"]:
-        lines.append(f"taken as absent: {', '.join(found['nuisances_not_fitted'])}")
-    return lines
-
-
-def _percent(value: float | None) -> str:
-    return f"{'-':>8s}" if value is None else f"{100.0 * value:8.3f}"
 
 
 def write_fitted(path: Path, fitted: Fitted, found: Mapping[str, Any]) -> Fibre:
