@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.cells import Residual
-from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.significance import significance
+from xb_muscle_ros.diagnose.noise.cells import Residual
+from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
+from xb_muscle_ros.diagnose.noise.significance import significance
 from xb_muscle_ros.scores.noise.model import NoiseModel
 from xb_muscle_ros.scores.noise.pieces import evenly_sampled, smooth_pieces
 from xb_muscle_ros.scores.noise.trials import by_curves

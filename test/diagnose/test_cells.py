@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xb_muscle_ros.diagnose.cells import LEAST_SAMPLES, Residual, cut, exceeding, mean, phase_names, rms
+from xb_muscle_ros.diagnose.noise.cells import LEAST_SAMPLES, Residual, cut, exceeding, mean, phase_names, rms
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.trial import Phase

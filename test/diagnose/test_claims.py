@@ -21,7 +21,7 @@ from xb_muscle_ros.diagnose.mismatch import Bound
 from xb_muscle_ros.diagnose.names import Name, Verdict
 from xb_muscle_ros.diagnose.report.markup import Markup
 from xb_muscle_ros.diagnose.report.verdict import verdict_box
-from xb_muscle_ros.diagnose.significance import ALPHA, FLOOR_F0
+from xb_muscle_ros.diagnose.noise.significance import ALPHA, FLOOR_F0
 from xb_muscle_ros.diagnose.summary import summary_text
 from xb_muscle_ros.diagnose.verdict import Evidence, decide
 from xb_muscle_ros.diagnose.words import likely

@@ -12,10 +12,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from xb_muscle_ros.diagnose.cells import Residual
-from xb_muscle_ros.diagnose.flexible import flexible_fit
-from xb_muscle_ros.diagnose.kernel import law, memories
-from xb_muscle_ros.diagnose.linear_fit import LinearFit
+from xb_muscle_ros.diagnose.noise.cells import Residual
+from xb_muscle_ros.diagnose.noise.flexible import flexible_fit
+from xb_muscle_ros.diagnose.noise.kernel import law, memories
+from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.errors import UserError
 
 Array = npt.NDArray[np.float64]

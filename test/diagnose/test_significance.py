@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from xb_muscle_ros.diagnose.cells import Residual, cut, rms
-from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.significance import family_wise, null_residuals, significance, step_down
+from xb_muscle_ros.diagnose.noise.cells import Residual, cut, rms
+from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
+from xb_muscle_ros.diagnose.noise.significance import family_wise, null_residuals, significance, step_down
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.replay.made import coloured_noise
 from xb_muscle_ros.scores.noise.model import NoiseModel

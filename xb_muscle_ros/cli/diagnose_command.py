@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_overwrite, add_reading, add_work, known_of, warn, work_options_of
+from xb_muscle_ros.cli.common import add_overwrite, add_reading, add_work, known_of, work_options_of
 
 if TYPE_CHECKING:
     Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
@@ -21,7 +21,13 @@ def add(subparsers: Subparsers) -> None:
     )
     parser.add_argument("bags", nargs="+", type=Path, metavar="BAG", help="bags or folders, in the order of recording")
     parser.add_argument(
-        "--fiber", "--fibre", dest="fiber", required=True, help="fibre file, or name of a fibre in the package"
+        "--fiber",
+        "--fibre",
+        dest="fiber",
+        required=True,
+        nargs="+",
+        metavar="FIBER",
+        help="fibre files, or names of fibres in the package; with several, bags are found by the fibre's name",
     )
     parser.add_argument("--model", help="parameter set of the fibre file (default: the one the file names)")
     parser.add_argument("--method", help="how heads are distributed over strain (default: the fibre file's)")
@@ -36,7 +42,8 @@ def add(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, print the answer, say where the report is."""
-    from xb_muscle_ros.diagnose.outcome import older_results
+    from xb_muscle_ros.diagnose.outputs import older_results
+    from xb_muscle_ros.diagnose.report.terminal import terminal_text
     from xb_muscle_ros.diagnose.run import diagnose_bags
     from xb_muscle_ros.files import refuse_older
 
@@ -54,11 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
         known=known_of(arguments),
         only=arguments.trials_of,
     )
-    for line in found["warnings"]:
-        warn(line)
-    print(found["summary"])
-    print(f"verdict: {found['verdict']}{': ' + ', '.join(found['answer']) if found['answer'] else ''}")
-    for name in ("report.html", "diagnosis.json", found["augmented_fiber"]):
-        if name:
-            print(out / name)
+    print(terminal_text(found))
+    for name in ("report.html", "diagnosis.json", *found.augmented.values()):
+        print(out / name)
     return 0

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from xb_muscle_ros.diagnose.refit import Fit
-from xb_muscle_ros.diagnose.study import Explanation, Study
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.offline import simulate_trial
 from xb_muscle_ros.trials.trial import Array, Phase, Trial, TrialFacts
@@ -40,12 +39,12 @@ class Proposal(NamedTuple):
 
     Attributes:
         protocol: what to record.
-        separates: labels of the two explanations.
+        separates: names of the components that it separates.
         difference_f0: root-mean-square by which they differ there.
     """
 
     protocol: Protocol
-    separates: tuple[str, str]
+    separates: tuple[str, ...]
     difference_f0: float
 
 
@@ -88,31 +87,25 @@ def _ramp(fibre: str, pca: float, start_l0: float, amplitude_l0: float, speed: f
     return Protocol(words, trial)
 
 
-def propose(study: Study, one: Fit, other: Fit, pcas: Sequence[float]) -> Proposal | None:
-    """The protocol on which two fits differ most; None where neither has a solution on any.
+def propose(one: Fibre, other: Fibre, separates: Sequence[str], pcas: Sequence[float]) -> Proposal | None:
+    """The protocol on which two models differ most; None where neither has a solution on any.
 
     Args:
-        study: all trials.
-        one, other: fits of rival explanations; faults have no part in it, the next recording has its own.
+        one, other: fitted fibres; measurement errors have no part in it, the next recording has its own.
+        separates: names of the components in which they differ.
         pcas: at which solutions are at hand.
     """
-    muscles = [_muscle(study, fit) for fit in (one, other)]
+    muscles = [Muscle(one), Muscle(other)]
     best: Proposal | None = None
-    for protocol in menu(study.fibre.name, pcas):
+    for protocol in menu(one.name, pcas):
         try:
             forces: list[Array] = [simulate_trial(muscle, protocol.trial).force_n for muscle in muscles]
         except UserError:
             continue
         apart = float(np.sqrt(np.mean((forces[0] - forces[1]) ** 2)))
         if best is None or apart > best.difference_f0:
-            best = Proposal(protocol, (one.explanation.label, other.explanation.label), apart)
+            best = Proposal(protocol, tuple(separates), apart)
     return best
-
-
-def _muscle(study: Study, fit: Fit) -> Muscle:
-    values: Mapping[str, float] = {k: v for k, v in fit.values.items() if "[" not in k}
-    problem = study.problem(Explanation(fit.explanation.mechanisms), values)
-    return Muscle(problem.fibre_at(problem.start))
 
 
 def scaled(trial: Trial, reference_length_m: float, f0_n: float) -> Trial:

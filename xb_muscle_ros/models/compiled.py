@@ -60,6 +60,20 @@ def cache_folder() -> Path:
     )
 
 
+def _path(name: str, smooth: bool) -> Path:
+    """File of a composition's generated module."""
+    return cache_folder() / f"m_{name}_{'smooth' if smooth else 'exact'}_{_fingerprint()}.py"
+
+
+def is_compiled(model: str, method: str, smooth: bool) -> bool:
+    """Whether this machine's cache has a model's module, so that loading it takes no more than a moment.
+
+    Raises:
+        UserError: unknown names, or no folder to write to.
+    """
+    return _path(compose(model, method).name, smooth).exists()
+
+
 @functools.cache
 def compiled(model: str, method: str, smooth: bool) -> ModuleType:
     """The compiled module of a model: `advance`, `run`, `follow`, `outputs`, `rest`, `rhs` and its sizes.
@@ -73,8 +87,8 @@ def compiled(model: str, method: str, smooth: bool) -> ModuleType:
         UserError: unknown names, or no folder to write to.
     """
     composition = compose(model, method)
-    stem = f"m_{composition.name}_{'smooth' if smooth else 'exact'}_{_fingerprint()}"
-    path = cache_folder() / f"{stem}.py"
+    path = _path(composition.name, smooth)
+    stem = path.stem
     if not path.exists():
         from xb_muscle_ros.models.codegen import module_text
 

@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from xb_muscle_ros.diagnose.cells import Residual
-from xb_muscle_ros.diagnose.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.significance import significance
+from xb_muscle_ros.diagnose.noise.cells import Residual
+from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
+from xb_muscle_ros.diagnose.noise.significance import significance
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.scores.noise.model import NoiseModel, Source
 from xb_muscle_ros.scores.noise.trials import by_windows, completed, noise_of

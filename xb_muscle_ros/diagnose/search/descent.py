@@ -80,7 +80,9 @@ class Fit:
     def from_json(row: Mapping[str, Any]) -> Fit:
         """From plain data."""
         names = ordered([Name(n) for n in row["names"]])
-        return Fit(names, row["values"], row["mean_square_f0"], row["prior"], row["occam"], row["sds"], row["simulated"])
+        return Fit(
+            names, row["values"], row["mean_square_f0"], row["prior"], row["occam"], row["sds"], row["simulated"]
+        )
 
 
 @dataclass
@@ -228,4 +230,6 @@ class Descent:
         _, twice = np.linalg.slogdet(curvature[np.ix_(known, known)] * widths * widths[:, None])
         sds = np.sqrt(np.maximum(np.diag(np.linalg.pinv(curvature)), 0.0))
         by_label = {c.label: float(sd) for c, sd in zip(self.problem.coordinates, sds, strict=True)}
-        return Fit(ordered(names), values, point.mean_square, prior, 0.5 * float(twice), by_label, round(self.simulated))
+        return Fit(
+            ordered(names), values, point.mean_square, prior, 0.5 * float(twice), by_label, round(self.simulated)
+        )

@@ -93,11 +93,13 @@ class Explorer:
         self.fits: dict[Names, tuple[Fit, ...]] = {}
         self.promised: dict[Names, tuple[float, ...]] = {}
         self.unsolved: list[Names] = []
-        self._adjusted: dict[Names, float] = {}
+        self._adjusted: dict[tuple[Names, int | None], float] = {}
         self._linear: dict[Names, list[Linear]] = {}
         self.floors_f0 = [s.noise_f0 for s in systems]
 
-    def fit(self, wanted: Sequence[tuple[Collection[Name], Sequence[Sequence[Mapping[str, float]]]]], why: str) -> list[Names]:
+    def fit(
+        self, wanted: Sequence[tuple[Collection[Name], Sequence[Sequence[Mapping[str, float]]]]], why: str
+    ) -> list[Names]:
         """Fit sets, each with starts for every fibre; those that have a solution in all of them."""
         missing = [(ordered(names), starts) for names, starts in wanted if ordered(names) not in self.fits]
         tasks = [
@@ -130,10 +132,12 @@ class Explorer:
             self._linear[names] = [Linear(s, f) for s, f in zip(self.systems, self.fits[names], strict=True)]
         return self._linear[names]
 
-    def evidence(self, names: Names) -> float:
-        """Logarithm of a set's probability but for a constant, all fibres together."""
-        own = [-self._cost(s, f, floor) for s, f, floor in zip(self.systems, self.fits[names], self.floors_f0, strict=True)]
-        return float(sum(own)) + self.odds(names) + self.adjusted(names)
+    def evidence(self, names: Names, fibre: int | None = None) -> float:
+        """Logarithm of a set's probability but for a constant, by all fibres together or by one."""
+        chosen = range(len(self.systems)) if fibre is None else [fibre]
+        fits = self.fits[names]
+        own = [self._cost(self.systems[i], fits[i], self.floors_f0[i]) for i in chosen]
+        return self.odds(names) + self.adjusted(names, fibre) - float(sum(own))
 
     def estimates(self, names: Names) -> dict[str, list[Estimate]]:
         """Coordinates of the mechanisms of a set in every fibre, by label."""
@@ -146,14 +150,19 @@ class Explorer:
             coordinates = {c.label: c for c in system.problem(names, fit.values).coordinates}
             for label in labels:
                 c = coordinates[label]
-                found[label].append(Estimate(c.inward(fit.values[label]), fit.sds[label], c.prior_mean, c.prior_sd, label in effects))
+                found[label].append(
+                    Estimate(c.inward(fit.values[label]), fit.sds[label], c.prior_mean, c.prior_sd, label in effects)
+                )
         return found
 
-    def adjusted(self, names: Names) -> float:
+    def adjusted(self, names: Names, fibre: int | None = None) -> float:
         """What it adds to the evidence that effects are mostly small, and alike in all fibres."""
-        if names not in self._adjusted:
-            self._adjusted[names] = sum(adjustment(e) for e in self.estimates(names).values())
-        return self._adjusted[names]
+        key = names, fibre
+        if key not in self._adjusted:
+            found = self.estimates(names).values()
+            chosen = [e if fibre is None else [e[fibre]] for e in found]
+            self._adjusted[key] = sum(adjustment(e) for e in chosen)
+        return self._adjusted[key]
 
     @staticmethod
     def odds(names: Names) -> float:
@@ -204,20 +213,38 @@ class Explorer:
         for n in chosen:
             starts = [[*p.starts] for p in promises[n]]
             if np.isnan(gains[n]):
-                own = CATALOGUE_STARTS(self.systems, n)
+                own = starts_of(self.systems, n)
                 starts = [[*s, *o] for s, o in zip(starts, own, strict=True)]
             wanted.append(((*names, n), starts))
         return self.fit(wanted, f"{label(names)} and one more")
 
+    def base(self) -> None:
+        """Fit the base, from several starts.
+
+        Raises:
+            UserError: the model has no solution in some fibre.
+        """
+        if () not in self.fits:
+            self.fit([((), [[{}, *_spread(s)] for s in self.systems])], "base")
+        if () not in self.fits:
+            names = ", ".join(s.fibre.name for s in self.systems)
+            raise UserError(
+                f"fibre {names}, model {self.systems[0].fibre.model}: no solution at the values of the fibre file; "
+                "start from another one"
+            )
+
+    def anew(self, systems: Sequence[System]) -> None:
+        """Other systems; fits start where those of the former ones ended."""
+        starts = [[f.values] for f in self.fits[()]]
+        self.systems = list(systems)
+        for kept in (self.fits, self.promised, self.unsolved, self._adjusted, self._linear):
+            kept.clear()
+        self.fit([((), starts)], "base once more")
+        self.base()
+
     def explore(self) -> Names:
         """Search; the set with the most evidence."""
-        self.fit([((), [[{}, *_spread(s)] for s in self.systems])], "base")
-        if () not in self.fits:
-            s = self.systems[0]
-            raise UserError(
-                f"fibre {s.fibre.name}, model {s.fibre.model}: no solution at the values of the fibre file; start from "
-                "another one"
-            )
+        self.base()
         current: Names = ()
         for k in range(self.effort.steps):
             found = self.step(current, self.effort.candidates, blind=k < 2)
@@ -260,7 +287,7 @@ class Explorer:
         self.step(names, self.effort.rivals, blind=False)
 
 
-def CATALOGUE_STARTS(systems: Sequence[System], name: Name) -> list[list[dict[str, float]]]:
+def starts_of(systems: Sequence[System], name: Name) -> list[list[dict[str, float]]]:
     """Starts of a mechanism from the fibre file's own parameters."""
     return [[dict(s) for s in CATALOGUE[name.value].starting_values(system.fibre.values)] for system in systems]
 

@@ -57,7 +57,9 @@ class Linear:
         self.free = ~stuck
         self._curvature, self._gradient = curvature, gradient
 
-    def solve(self, columns: Array, information: Array, gradient: Array, own: Array | None = None) -> tuple[Array, Array, float, float]:
+    def solve(
+        self, columns: Array, information: Array, gradient: Array, own: Array | None = None
+    ) -> tuple[Array, Array, float, float]:
         """Joint solution of the fit's coordinates and of further columns.
 
         Args:
@@ -145,5 +147,3 @@ def _of_artefact(linear: Linear, name: Name) -> Promise:
     moves, found, gain, mean_square = linear.solve(columns, information, np.zeros(len(mine)))
     values = {problem.coordinates[j].label: float(v) for j, v in zip(mine, found, strict=True)}
     return Promise(name, gain, ({**linear.values(moves), **values},), mean_square)
-
-

@@ -100,9 +100,7 @@ class System:
         merged = tuple(_started(c, values, present) for c in {c.label: c for c in coordinates}.values())
         correction = None
         if self.closure_f0:
-            correction = Correction(
-                np.zeros(len(merged)), self.closure_f0, {}, np.empty(0), np.empty((0, len(merged)))
-            )
+            correction = Correction(np.zeros(len(merged)), self.closure_f0, {}, np.empty(0), np.empty((0, len(merged))))
         return Problem(fibre, self.trials, merged, {}, correction=correction)
 
     def _artefacts(self, names: Names) -> list[Coordinate]:

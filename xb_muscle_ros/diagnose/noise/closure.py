@@ -1,8 +1,8 @@
 """The Gaussian form's own error: what closing the moments leaves out of the distribution's force.
 
 It is 0.3 to 0.6 % F0 where the paper's fibres are stretched, as much as a mechanism's effect may be. It is no physics,
-so it is taken out before anything is looked for: the difference of both forms at the fitted point is added to the
-Gaussian form's forces in every fit.
+so it is taken out before anything is looked for: the difference of both forms at the base's fitted point is added to
+the Gaussian form's forces in every fit.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.refit import Fit
-from xb_muscle_ros.diagnose.study import Study
+from xb_muscle_ros.diagnose.search.whole import only
 from xb_muscle_ros.distribution.gaussian import Gaussian
 from xb_muscle_ros.distribution.grid import Characteristics
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.methods import difference
+from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.models.composition import Composition
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.parameters import complete
@@ -34,18 +34,27 @@ def by_distribution(fibre: Fibre) -> Fibre:
     return replace(fibre, method=Characteristics.name, values=MappingProxyType(values))
 
 
-def closure_error(study: Study, fit: Fit) -> Mapping[str, Array]:
-    """Force by the distribution less that of the Gaussian form at a fit's point, F0 at every trial's samples.
+def has_closure(fibre: Fibre) -> bool:
+    """Whether a fibre's model goes by the Gaussian form, and has heads whose distribution that form closes."""
+    return fibre.method == Gaussian.name and isinstance(compose(fibre.model, fibre.method), Composition)
+
+
+def closure_error(problem: Problem, given: Fibre) -> Mapping[str, Array]:
+    """Force by the distribution less that of the Gaussian form at a problem's start, F0 at every trial's samples.
 
     Empty where the fibre's own method is a distribution already, where there are no heads, or where the distribution
     has no solution.
+
+    Args:
+        problem: of the base, in the whole model.
+        given: the fibre as it was given, without what the whole model has besides.
     """
-    fibre = study.fibre
-    if fibre.method != Gaussian.name or not isinstance(compose(fibre.model, fibre.method), Composition):
+    if not has_closure(given):
         return {}
-    problem = replace(fit.problem(study), correction=None)
     try:
-        detailed = replace(problem, fibre=by_distribution(problem.fibre))
-        return difference(detailed, problem.start).force
+        bare = replace(
+            problem, fibre=by_distribution(only(problem.fibre_at(problem.start), given, ())), correction=None
+        )
+        return difference(bare, problem.start).force
     except UserError:
         return {}

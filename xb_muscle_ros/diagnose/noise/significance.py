@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.cells import Cell, Residual, cut, exceeding, mean, phase_names, rms
-from xb_muscle_ros.diagnose.linear_fit import LinearFit
+from xb_muscle_ros.diagnose.noise.cells import Cell, Residual, cut, exceeding, mean, phase_names, rms
+from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.scores.noise.model import NoiseModel
 

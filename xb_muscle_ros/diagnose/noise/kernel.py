@@ -17,8 +17,8 @@ import numpy.typing as npt
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import nnls
 
-from xb_muscle_ros.diagnose.cells import Residual, check
-from xb_muscle_ros.diagnose.linear_fit import LinearFit
+from xb_muscle_ros.diagnose.noise.cells import Residual, check
+from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.errors import UserError
 
 Array = npt.NDArray[np.float64]

@@ -1,0 +1,205 @@
+"""From averages and held-out predictions to components and verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from xb_muscle_ros.diagnose.inference.averaging import Averaged, averaged, grouped
+from xb_muscle_ros.diagnose.inference.calibration import calibrated
+from xb_muscle_ros.diagnose.inference.heldout import HeldOut
+from xb_muscle_ros.diagnose.inference.population import distribution
+from xb_muscle_ros.diagnose.inference.shares import unique
+from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
+from xb_muscle_ros.diagnose.result import NAMED, SURE, Component, Kind, OfFibre, Parameter, Verdict
+from xb_muscle_ros.diagnose.search.explore import Explorer
+from xb_muscle_ros.diagnose.search.system import Names, ordered
+from xb_muscle_ros.fit.coordinates import Coordinate
+from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.models.catalogue import CATALOGUE
+from xb_muscle_ros.models.parameters import PARAMETERS
+
+_NORMAL = 1.959964
+# A value this near a bound, as a share of the way between bounds, ended there.
+_AT_BOUND = 1e-3
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A study, searched and predicted.
+
+    Attributes:
+        explorer: all fits.
+        heldout: predictions of left-out conditions.
+        averages: over all fibres; of each fibre.
+        noise_f0: of each fibre's recordings.
+    """
+
+    explorer: Explorer
+    heldout: HeldOut
+    averages: Averaged
+    of_fibres: tuple[Averaged, ...]
+    noise_f0: tuple[float, ...]
+
+    @staticmethod
+    def of(explorer: Explorer, heldout: HeldOut, noise_f0: Sequence[float]) -> Judged:
+        """With averages over what was searched."""
+        single = len(explorer.systems) == 1
+        whole = averaged(explorer)
+        each = (whole,) if single else tuple(averaged(explorer, i) for i in range(len(explorer.systems)))
+        return Judged(explorer, heldout, whole, each, tuple(noise_f0))
+
+    @property
+    def groups(self) -> list[tuple[Name, ...]]:
+        """Components as names that stand together."""
+        names = [n for n in Name if any(n in s for s in self.averages.sets)]
+        return grouped(self.averages, names)
+
+    def probability(self, group: Sequence[Name], fibre: int | None = None) -> float:
+        """Inclusion probability of a component, by all fibres or by one."""
+        averages = self.averages if fibre is None else self.of_fibres[fibre]
+        return calibrated(averages.log_odds(group))
+
+    @property
+    def chosen(self) -> Names:
+        """The set that stands for the answer: the most probable one with every component that is named and no other.
+
+        Of a component with several members the likeliest.
+        """
+        wanted = [g for g in self.groups if self.probability(g) >= NAMED]
+        named = {n for g in wanted for n in g}
+        fitted = [s for s in self.explorer.fits if set(s) <= named and all(len(set(s) & set(g)) == 1 for g in wanted)]
+        if fitted:
+            return max(fitted, key=self.explorer.evidence)
+        return ordered(g[0] for g in wanted)
+
+
+def components(judged: Judged) -> tuple[Component, ...]:
+    """All candidates, the most probable first; those of the answer with all that is known of them."""
+    chosen = judged.chosen
+    found = [_component(judged, group, chosen) for group in judged.groups]
+    return tuple(sorted(found, key=lambda c: -c.inclusion_probability))
+
+
+def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Component:
+    e = judged.explorer
+    probability = judged.probability(group)
+    own = next((n for n in group if n in chosen), None)
+    lead = own or group[0]
+    names = [n for n in Name if n not in group]
+    rivals = judged.averages.rivals(lead, [n for n in names if (n in MEASUREMENT) == (lead in MEASUREMENT)])
+    without = tuple(n for n in chosen if n is not own)
+    share, gain = 0.0, None
+    if own is not None:
+        share = unique(e, chosen, without, judged.noise_f0)
+        gain = judged.heldout.gain(chosen, without)
+    best = _set_with(judged, lead)
+    by_fibre = tuple(
+        OfFibre(
+            fibre=system.fibre.name,
+            inclusion_probability=judged.probability(group, i),
+            share_of_mismatch=unique(e, chosen, without, judged.noise_f0, i) if own is not None else 0.0,
+            heldout_gain=judged.heldout.gain(chosen, without, i) if own is not None else None,
+            parameters=() if best is None else _of_one(judged, best, lead, i),
+        )
+        for i, system in enumerate(e.systems)
+    )
+    return Component(
+        name=lead.value if len(group) == 1 else FAMILY[lead],
+        kind=Kind.ARTEFACT if lead in MEASUREMENT else Kind.MECHANISM,
+        family=FAMILY[lead],
+        members=tuple(n.value for n in sorted(group, key=lambda n: (n is not lead, -judged.averages.including([n])))),
+        inclusion_probability=probability,
+        share_of_mismatch=share,
+        heldout_gain=gain,
+        parameters=() if best is None else _of_all(judged, best, lead),
+        not_separable_from=tuple(n.value for n in rivals),
+        by_fibre=by_fibre,
+    )
+
+
+def _set_with(judged: Judged, name: Name) -> Names | None:
+    """The set with the most evidence that has a name."""
+    having = [s for s in judged.explorer.fits if name in s]
+    return max(having, key=judged.explorer.evidence, default=None)
+
+
+def _of_one(judged: Judged, names: Names, name: Name, i: int) -> tuple[Parameter, ...]:
+    """A name's parameters in one fibre."""
+    fit = judged.explorer.fits[names][i]
+    problem = judged.explorer.systems[i].problem(names, fit.values)
+    wanted = (name.value,) if name in MEASUREMENT else CATALOGUE[name.value].parameters
+    rows = []
+    for c in problem.coordinates:
+        if c.name in wanted:
+            z, sd = c.inward(fit.values[c.label]), fit.sds[c.label]
+            low, high = (
+                c.outward(max(min(x, c.inward(c.upper)), c.inward(c.lower)))
+                for x in (z - _NORMAL * sd, z + _NORMAL * sd)
+            )
+            rows.append(Parameter(c.label, _unit(c), fit.values[c.label], (low, high), _at_bound(c, z)))
+    return tuple(rows)
+
+
+def _of_all(judged: Judged, names: Names, name: Name) -> tuple[Parameter, ...]:
+    """A name's parameters over all fibres: the centre of their distribution."""
+    e = judged.explorer
+    if len(e.systems) == 1:
+        return _of_one(judged, names, name, 0)
+    if name in MEASUREMENT:
+        return ()
+    rows = []
+    estimates = e.estimates(names)
+    coordinates = {c.label: c for c in e.systems[0].problem(names, e.fits[names][0].values).coordinates}
+    for label in CATALOGUE[name.value].parameters:
+        c, d = coordinates[label], distribution(estimates[label])
+        low, high = c.outward(d.mean - _NORMAL * d.se), c.outward(d.mean + _NORMAL * d.se)
+        # On a logarithmic scale the spread is that around the centre.
+        value = c.outward(d.mean)
+        spread = value * float(np.expm1(d.spread)) if c.log else d.spread
+        rows.append(Parameter(label, _unit(c), value, (low, high), False, spread))
+    return tuple(rows)
+
+
+def _unit(c: Coordinate) -> str:
+    return FAULTS[c.name].unit if c.group is not None else PARAMETERS[c.name].unit
+
+
+def _at_bound(c: Coordinate, z: float) -> bool:
+    low, high = c.inward(c.lower), c.inward(c.upper)
+    return not _AT_BOUND * (high - low) < z - low < (1.0 - _AT_BOUND) * (high - low)
+
+
+def answer_of(found: Sequence[Component]) -> tuple[str, ...]:
+    """Mechanisms of the answer, best first: of a family that is not told apart its likeliest member."""
+    return tuple(c.members[0] for c in found if c.kind is Kind.MECHANISM and c.inclusion_probability >= NAMED)
+
+
+def verdict_of(found: Sequence[Component], described: bool, detected: bool, fine: bool) -> Verdict:
+    """What the diagnosis says as a whole.
+
+    Args:
+        found: all components.
+        described: whether the base describes the recordings at all.
+        detected: whether the base leaves more than noise and the practical floor.
+        fine: whether the fibre file as given is as good as the base fitted anew.
+    """
+    mechanisms = [c for c in found if c.kind is Kind.MECHANISM and c.inclusion_probability >= NAMED]
+    artefacts = [c for c in found if c.kind is Kind.ARTEFACT and c.inclusion_probability >= NAMED]
+    if not described:
+        return Verdict.UNEXPLAINED
+    if any(_sure(c) for c in mechanisms):
+        return Verdict.PHYSICS
+    if mechanisms:
+        return Verdict.AMBIGUOUS
+    if artefacts:
+        return Verdict.MEASUREMENT
+    if not detected:
+        return Verdict.NONE if fine else Verdict.PARAMETERS
+    return Verdict.UNEXPLAINED
+
+
+def _sure(c: Component) -> bool:
+    return c.inclusion_probability >= SURE and c.heldout_gain is not None and c.heldout_gain.beyond_error

@@ -1,0 +1,131 @@
+"""Inclusion probabilities: averages over sets, not the names of the one set that a search ended in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.special import logsumexp
+
+from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
+from xb_muscle_ros.diagnose.search.descent import TOLD
+from xb_muscle_ros.diagnose.search.explore import Explorer
+from xb_muscle_ros.diagnose.search.system import Names
+
+Array = npt.NDArray[np.float64]
+
+# What one more name costs that was not fitted, in the place of its occam factor.
+_UNFITTED = 1.5
+# A name whose member is this likely within its family stands for itself.
+SEPARATE = 0.8
+# Rivals: the chance that either is there exceeds that of the likelier one by this much.
+_TRADES = 0.1
+
+
+@dataclass(frozen=True)
+class Averaged:
+    """Sets with their probabilities.
+
+    Attributes:
+        sets: fitted ones and those one name beside them.
+        log_evidence: of each, relative to the best, shape (sets,).
+        mean_square_f0: of each, fibres averaged, F0², shape (sets,).
+        fitted: whether each was fitted, shape (sets,).
+    """
+
+    sets: tuple[Names, ...]
+    log_evidence: Array
+    mean_square_f0: Array
+    fitted: npt.NDArray[np.bool_]
+
+    @property
+    def probability(self) -> Array:
+        """Of each set, shape (sets,)."""
+        chances: Array = np.exp(self.log_evidence - logsumexp(self.log_evidence))
+        return chances
+
+    def including(self, names: Collection[Name]) -> float:
+        """That one of some names, or several, are part of the truth."""
+        wanted = set(names)
+        return float(min(1.0, sum(p for p, s in zip(self.probability, self.sets, strict=True) if wanted & set(s))))
+
+    def log_odds(self, names: Collection[Name]) -> float:
+        """Of the same; as large as the numbers allow."""
+        wanted = set(names)
+        here = np.array([bool(wanted & set(s)) for s in self.sets])
+        if not np.any(here) or np.all(here):
+            return -math.inf if not np.any(here) else math.inf
+        return float(logsumexp(self.log_evidence[here]) - logsumexp(self.log_evidence[~here]))
+
+    def rivals(self, name: Name, others: Sequence[Name]) -> list[Name]:
+        """Names that take its place in other sets."""
+        own = self.including([name])
+        found = []
+        for other in others:
+            if other is name:
+                continue
+            theirs = self.including([other])
+            either = self.including([name, other])
+            if min(own, theirs) >= 0.02 and either - max(own, theirs) >= _TRADES * min(1.0, own + theirs):
+                found.append(other)
+        return found
+
+
+def averaged(explorer: Explorer, fibre: int | None = None) -> Averaged:
+    """All sets that were looked at, by the evidence of all fibres or of one."""
+    sets, evidence, squares, fitted = [], [], [], []
+    chosen = range(len(explorer.systems)) if fibre is None else [fibre]
+    for names, fits in explorer.fits.items():
+        sets.append(names)
+        evidence.append(explorer.evidence(names, fibre))
+        squares.append(float(np.mean([fits[i].mean_square_f0 for i in chosen])))
+        fitted.append(True)
+    for names, promised in explorer.promised.items():
+        if names in explorer.fits or names in explorer.unsolved:
+            continue
+        parents = [tuple(m for m in names if m is not n) for n in names]
+        parent = max((p for p in parents if p in explorer.fits), key=explorer.evidence, default=None)
+        if parent is None:
+            continue
+        gained = -_UNFITTED + explorer.odds(names) - explorer.odds(parent)
+        for i in chosen:
+            system, floor = explorer.systems[i], explorer.floors_f0[i]
+            told = TOLD * float(np.sum(system.weights))
+            before = explorer.fits[parent][i].mean_square_f0
+            gained += 0.5 * told * math.log((floor**2 + before) / (floor**2 + min(promised[i], before)))
+        # What a line promises and nobody fitted is no evidence beyond that of what was fitted.
+        sets.append(names)
+        evidence.append(min(explorer.evidence(parent, fibre) + gained, explorer.evidence(explorer.best(), fibre) - 1.0))
+        squares.append(float(np.mean([promised[i] for i in chosen])))
+        fitted.append(False)
+    found = np.array(evidence)
+    return Averaged(tuple(sets), found - found.max(), np.array(squares), np.array(fitted))
+
+
+def families(names: Sequence[Name]) -> dict[str, list[Name]]:
+    """Names by family."""
+    found: dict[str, list[Name]] = {}
+    for name in names:
+        found.setdefault(FAMILY[name], []).append(name)
+    return found
+
+
+def grouped(averages: Averaged, names: Sequence[Name]) -> list[tuple[Name, ...]]:
+    """Components: names that stand for themselves, and families whose members the recordings do not tell apart."""
+    found: list[tuple[Name, ...]] = []
+    for members in families(names).values():
+        order = sorted(members, key=lambda n: -averages.including([n]))
+        together = averages.including(order)
+        rest = [n for n in order if averages.including([n]) >= 0.1 * together]
+        trading = len(rest) > 1 and averages.including([order[0]]) < SEPARATE * together
+        # Members that act together are two components.
+        both = sum(averages.including([n]) for n in rest) > 1.2 * together
+        if together >= 0.1 and trading and not both and order[0] not in MEASUREMENT:
+            found.append(tuple(rest))
+            found += [(n,) for n in order if n not in rest]
+        else:
+            found += [(n,) for n in order]
+    return found

@@ -1,0 +1,1 @@
+"""Residuals against noise: whether, where and when something is missing, and the law of what remains."""

@@ -1,0 +1,225 @@
+"""The record of a diagnosis, and its files, from a study that was searched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.diagnose import notes, outside
+from xb_muscle_ros.diagnose.effort import Effort
+from xb_muscle_ros.diagnose.inference.answer import answer_of, components, verdict_of
+from xb_muscle_ros.diagnose.inference.shares import explained
+from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
+from xb_muscle_ros.diagnose.next_experiment import Proposal, scaled
+from xb_muscle_ros.diagnose.noise.closure import by_distribution
+from xb_muscle_ros.diagnose.noise.residuals import Around
+from xb_muscle_ros.diagnose.noise.significance import ALPHA, FLOOR_F0
+from xb_muscle_ros.diagnose.outputs import NEXT, Files, augmented_name
+from xb_muscle_ros.diagnose.planning import plan
+from xb_muscle_ros.diagnose.result import (
+    FORMAT,
+    Component,
+    Diagnosis,
+    NextExperiment,
+    Remaining,
+    SetOfMechanisms,
+    Verdict,
+)
+from xb_muscle_ros.diagnose.rows import benchmark, law_row, nuisances, of_fibres, of_trials, places, scores
+from xb_muscle_ros.diagnose.search.system import Names
+from xb_muscle_ros.diagnose.search.whole import beside, only
+from xb_muscle_ros.diagnose.searching import Searched
+from xb_muscle_ros.diagnose.tracing import directed, traced
+from xb_muscle_ros.models.fibre_file import Fibre
+
+Array = npt.NDArray[np.float64]
+
+# More noise than this hides what is looked for, F0; a base that leaves more than this share of the force's standard
+# deviation does not describe the recordings.
+_NOISY_F0, _UNDESCRIBED = 0.02, 0.5
+# The fibre file as given is as good as the fitted base within this factor.
+_AS_GOOD = 1.2
+_MOST_SETS = 40
+
+
+def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Files]:
+    """What was found, and what goes into files; seconds are left to the caller."""
+    judged, explorer = study.judged, study.explorer
+    chosen = judged.chosen
+    count = len(study.fibres)
+    before = [study.around((), i) for i in range(count)]
+    after = [study.around(chosen, i) if chosen else before[i] for i in range(count)]
+    left = [study.recordings[i].significance(after[i]) if chosen else study.base[i] for i in range(count)]
+    traces = traced(study, chosen, before, after)
+    found = tuple(directed(study, c, traces) for c in components(judged))
+    detected = any(s.detected(ALPHA) for s in study.base)
+    described = _described(study, before, after)
+    fine = all(
+        _rmsd(t.start_f0 - t.measured_f0) <= max(_AS_GOOD * _rmsd(t.before_f0 - t.measured_f0), FLOOR_F0)
+        for t in traces
+    )
+    verdict = verdict_of(found, described, detected, fine)
+    answer = answer_of(found) if described else ()
+    names = [f.name for f in study.fibres]
+    augmented = _augmented(study, chosen) if answer else {}
+    proposal = plan(study, found) if detected or answer else None
+    heldout = judged.heldout
+    gain = heldout.gain(chosen, ()) if chosen else None
+    known = {n: i for i, n in enumerate(names)}
+    base_law, last_law = (_law(study, arounds, detected) for arounds in (before, after))
+    remaining = Remaining(
+        rmsd_f0=_rmsd(np.concatenate([a.residual_f0 for a in after])),
+        noise_f0=float(np.median(judged.noise_f0)),
+        where=places(names, left),
+        law=last_law,
+    )
+    warned = [w for s in study.studies for t in s.trials for w in t.warnings]
+    warned += study.lines
+    if augmented:
+        for i, name in enumerate(names):
+            base = study.fibre_with((), i)
+            with_all = study.fibre_with(chosen, i)
+            warned += outside.warnings(with_all, base, study.recorded[i].trials)
+    d = Diagnosis(
+        format_version=FORMAT,
+        fibres=tuple(names),
+        model=study.studies[0].fibre.model,
+        method=study.fibres[0].method,
+        quick=effort != Effort(),
+        seed=seed,
+        seconds=0.0,
+        verdict=verdict,
+        answer=answer,
+        components=found,
+        explained_share=explained(explorer, chosen, judged.noise_f0) if chosen else 0.0,
+        mismatch=places(names, study.base),
+        p_value=min(1.0, count * min(s.overall_p for s in study.base)),
+        described=described,
+        remaining=remaining,
+        base_law=base_law,
+        before=scores(study, ()),
+        after=scores(study, chosen),
+        heldout_gain=gain,
+        benchmark_rmsd_f0=benchmark(study, before),
+        sets=_sets(study),
+        by_fibre=of_fibres(study, chosen, found),
+        trials=of_trials(study, chosen, traces),
+        nuisances=nuisances(study, chosen),
+        map_before={n: study.base[known[n]].map(ALPHA) for n in names},
+        map_after={n: left[known[n]].map(ALPHA) for n in names},
+        next_experiment=_next(proposal),
+        augmented={f.name: name for name, f in augmented.items()},
+        warnings=tuple(dict.fromkeys(warned)),
+        missing=tuple(_missing(study, verdict, found, after)),
+        notes=tuple(_notes(study, chosen, effort)),
+    )
+    protocol = None
+    if proposal is not None:
+        fibre = study.fibres[0]
+        protocol = scaled(proposal.protocol.trial, fibre.reference_length_m, fibre.f0_n)
+    return d, Files(augmented, tuple(t.plain for t in traces), protocol)
+
+
+def _rmsd(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _described(study: Searched, before: Sequence[Around], after: Sequence[Around]) -> bool:
+    """Whether there is anything to build on: the model describes the recordings, and noise does not hide all."""
+    for i, recorded in enumerate(study.recorded):
+        spread = float(np.std(recorded.measured))
+        left = min(_rmsd(before[i].residual_f0), _rmsd(after[i].residual_f0))
+        if study.judged.noise_f0[i] > _NOISY_F0 or left > _UNDESCRIBED * spread:
+            return False
+    return True
+
+
+def _law(study: Searched, arounds: Sequence[Around], detected: bool) -> object:
+    """The law of the fibre whose residual follows one best; None where none does."""
+    if not detected:
+        return None
+    found = [
+        law_row(study.fibres[i].name, law)
+        for i, around in enumerate(arounds)
+        if (law := study.recordings[i].law(around)) is not None
+    ]
+    return max(found, key=lambda row: row.explained, default=None)
+
+
+def _sets(study: Searched) -> tuple[SetOfMechanisms, ...]:
+    averages = study.judged.averages
+    order = np.argsort(-averages.log_evidence)[:_MOST_SETS]
+    chances = averages.probability
+    return tuple(
+        SetOfMechanisms(
+            names=tuple(n.value for n in averages.sets[k]),
+            probability=float(chances[k]),
+            log_evidence=float(averages.log_evidence[k]),
+            rmsd_f0=float(np.sqrt(averages.mean_square_f0[k])),
+            fitted=bool(averages.fitted[k]),
+        )
+        for k in order
+    )
+
+
+def _augmented(study: Searched, chosen: Names) -> dict[str, Fibre]:
+    """Fibres with the answer's mechanisms, by file name.
+
+    Where the Gaussian form's own error was taken out, they go by the distribution, which does not have it.
+    """
+    names = tuple(n for n in chosen if n not in MEASUREMENT)
+    made = {}
+    for i, given in enumerate(study.fibres):
+        fibre = only(study.fibre_with(chosen, i), given, names)
+        fibre = by_distribution(fibre) if study.recorded[i].closure_f0 else fibre
+        words = " and ".join(n.value for n in names)
+        trials = len(study.recorded[i].trials)
+        source = f"fitted by this package to {trials} trials of fibre {fibre.name}, with {words} (diagnosed)"
+        made[augmented_name(given.name, len(study.fibres) > 1)] = replace(fibre, source=source)
+    return made
+
+
+def _next(proposal: Proposal | None) -> NextExperiment | None:
+    if proposal is None:
+        return None
+    return NextExperiment(NEXT, proposal.protocol.words, proposal.separates, proposal.difference_f0)
+
+
+def _missing(study: Searched, verdict: Verdict, found: Sequence[Component], after: Sequence[Around]) -> list[str]:
+    """What a firmer answer would need, a line each."""
+    lines = []
+    if not study.judged.heldout:
+        lines.append("at least three trials, so that some can be held out: without that no mechanism is sure")
+    for i, recorded in enumerate(study.recorded):
+        name, noise = study.fibres[i].name, study.judged.noise_f0[i]
+        if noise > _NOISY_F0:
+            lines.append(f"force with less noise: {100 * noise:.1f} % F0 in fibre {name} hides what is looked for")
+        if _rmsd(after[i].residual_f0) > _UNDESCRIBED * float(np.std(recorded.measured)):
+            lines.append(
+                f"recordings that the model describes at all: after the fit half of the force's variation of fibre "
+                f"{name} is left; check that channels, units, calcium and fibre belong together"
+            )
+    if all(t.facts.pca is None or t.facts.pca < 8.0 for s in study.studies for t in s.trials):
+        lines.append("a trial without calcium (pCa 9), which tells passive from active effects")
+    if verdict is Verdict.AMBIGUOUS and all(c.heldout_gain is None or not c.heldout_gain.beyond_error for c in found):
+        lines.append("more conditions: nothing predicts those left out better than its standard error")
+    return lines
+
+
+def _notes(study: Searched, chosen: Names, effort: Effort) -> list[str]:
+    lines = list(notes.of_effort(effort, Effort(), min(len(s.trials) for s in study.studies)))
+    several = len(study.fibres) > 1
+    for i, each in enumerate(study.studies):
+        own = [
+            *each.told,
+            *notes.of_fibre(
+                each.fibre, each.trials, study.recordings[i], study.explorer.systems[i], study.explorer.fits[chosen][i]
+            ),
+        ]
+        lines += [f"fibre {study.fibres[i].name}: {line}" if several else line for line in own]
+    allowed = set.intersection(*(set(beside(f)) for f in study.fibres))
+    left_out = [n.value for n in Name if n not in MEASUREMENT and n not in allowed]
+    return [*lines, *notes.of_search(study.explorer.unsolved, left_out)]

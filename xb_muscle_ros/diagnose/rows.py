@@ -1,0 +1,170 @@
+"""Rows of the record: trials, fibres, nuisances, places and scores."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.diagnose.inference.left_out import left_out
+from xb_muscle_ros.diagnose.noise.kernel import Law as FoundLaw
+from xb_muscle_ros.diagnose.noise.residuals import Around
+from xb_muscle_ros.diagnose.noise.significance import ALPHA, Significance
+from xb_muscle_ros.diagnose.result import (
+    NAMED,
+    Component,
+    Kind,
+    Law,
+    Nuisance,
+    OfStudyFibre,
+    OfTrial,
+    Place,
+    Scores,
+)
+from xb_muscle_ros.diagnose.search.system import Names
+from xb_muscle_ros.diagnose.searching import Searched
+from xb_muscle_ros.diagnose.tracing import Traced
+from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.models.parameters import PARAMETERS
+
+Array = npt.NDArray[np.float64]
+
+_MOST_PLACES = 12
+
+
+def _rmsd(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def places(names: Sequence[str], found: Sequence[Significance]) -> tuple[Place, ...]:
+    """Where residuals stand out, the largest first; where only the whole does, its largest cell."""
+    rows = []
+    for name, s in zip(names, found, strict=True):
+        pcas = {r.trial: r.pca for r in s.residuals}
+        own = s.mismatch(ALPHA)
+        if not own and s.detected(ALPHA):
+            k = int(np.argmax(s.rms_f0))
+            cell = s.cells[k]
+            own = [
+                {
+                    "trial": cell.trial, "phase": cell.phase, "start_s": cell.start_s, "end_s": cell.end_s,
+                    "size_f0": float(s.rms_f0[k]), "mean_f0": float(s.mean_f0[k]), "p_value": float(s.p_value[k]),
+                }
+            ]  # fmt: skip
+        rows += [
+            Place(
+                fibre=name, trial=row["trial"], phase=row["phase"], start_s=row["start_s"], end_s=row["end_s"],
+                size_f0=row["size_f0"], mean_f0=row["mean_f0"], p_value=row["p_value"], pca=pcas[row["trial"]],
+            )
+            for row in own
+        ]  # fmt: skip
+    if len(names) > 1:
+        rows.sort(key=lambda p: -p.size_f0)
+    return tuple(rows[:_MOST_PLACES] if len(names) > 1 else rows)
+
+
+def law_row(fibre: str, law: FoundLaw) -> Law:
+    """A law as a row."""
+    return Law(
+        fibre=fibre,
+        time_constant_s=law.time_constant_s,
+        scales_with=law.scales_with,
+        gain_f0_per_l0=law.stiffness_f0_per_l0,
+        explained=law.explained,
+        tau_s=tuple(law.tau_s.tolist()),
+        weight_f0=tuple(law.weight_f0.tolist()),
+        others=dict(law.others),
+    )
+
+
+def scores(study: Searched, names: Names, i: int | None = None) -> Scores:
+    """How far a set is from the recordings, of all fibres or of one."""
+    chosen = range(len(study.fibres)) if i is None else [i]
+    squares = np.concatenate([study.around(names, k).residual_f0 for k in chosen])
+    return Scores(tuple(n.value for n in names), _rmsd(squares), study.judged.heldout.rmsd(names, i))
+
+
+def benchmark(study: Searched, before: Sequence[Around]) -> float | None:
+    """Held-out RMSD of a discrepancy without physics on top of the base, F0; None where nothing is left out."""
+    squares, samples = 0.0, 0
+    for recordings, around, folds in zip(study.recordings, before, study.judged.heldout.folds, strict=True):
+        found = recordings.benchmark(around, folds) if folds else None
+        if found is not None:
+            squares, samples = squares + found[1], samples + found[2]
+    return float(np.sqrt(squares / samples)) if samples else None
+
+
+def of_trials(study: Searched, chosen: Names, traces: Sequence[Traced]) -> tuple[OfTrial, ...]:
+    """A row for each trial."""
+    rows = []
+    for t in traces:
+        name = t.residual.trial
+        noise = study.recordings[t.fibre].noise.of([name]).trials[0]
+        held = [study.judged.heldout.rmsd_by_trial(s).get((t.fibre, name)) for s in ((), chosen)]
+        rows.append(
+            OfTrial(
+                fibre=study.fibres[t.fibre].name,
+                trial=name,
+                pca=t.residual.pca,
+                phases=tuple((p.name, p.start_s, p.end_s) for p in t.residual.phases),
+                noise_sd_f0=noise.sd_f0,
+                noise_from=noise.source.value,
+                noise_samples=noise.samples,
+                before_rmsd_f0=_rmsd(t.before_f0 - t.measured_f0),
+                after_rmsd_f0=_rmsd(t.after_f0 - t.measured_f0),
+                heldout_before_f0=held[0] if held[0] is not None and np.isfinite(held[0]) else None,
+                heldout_after_f0=held[1] if held[1] is not None and np.isfinite(held[1]) else None,
+            )
+        )
+    return tuple(rows)
+
+
+def nuisances(study: Searched, chosen: Names) -> tuple[Nuisance, ...]:
+    """Measurement errors as estimated beside the answer."""
+    rows = []
+    for i, system in enumerate(study.explorer.systems):
+        fit = study.explorer.fits[chosen][i]
+        for c in system.problem(chosen, fit.values).coordinates:
+            if c.group is not None:
+                rows.append(
+                    Nuisance(
+                        fibre=study.fibres[i].name, name=c.name, group=c.group, unit=FAULTS[c.name].unit,
+                        value=fit.values[c.label], sd=fit.sds[c.label], prior_sd=c.prior_sd,
+                    )
+                )  # fmt: skip
+    return tuple(rows)
+
+
+def of_fibres(study: Searched, chosen: Names, found: Sequence[Component]) -> tuple[OfStudyFibre, ...]:
+    """A row for each fibre."""
+    rows = []
+    predicted = left_out(study, chosen) if len(study.fibres) > 1 and chosen else [None] * len(study.fibres)
+    for i, fibre in enumerate(study.fibres):
+        base = study.explorer.fits[()][i]
+        own = [
+            (c.by_fibre[i].inclusion_probability, c.members[0])
+            for c in found
+            if c.kind is Kind.MECHANISM and c.by_fibre[i].inclusion_probability >= NAMED
+        ]
+        closure = study.recorded[i].closure_f0
+        size = _rmsd(np.concatenate(list(closure.values()))) if closure else 0.0
+        rows.append(
+            OfStudyFibre(
+                fibre=fibre.name,
+                model=study.studies[i].fibre.model,
+                trials=len(study.recorded[i].trials),
+                answer=tuple(name for _, name in sorted(own, reverse=True)),
+                before=scores(study, (), i),
+                after=scores(study, chosen, i),
+                left_out_rmsd_f0=predicted[i],
+                p_value=study.base[i].overall_p,
+                base_parameters=tuple(
+                    (name, float(fibre.values[name]), value, PARAMETERS[name].unit)
+                    for name, value in base.values.items()
+                    if name in fibre.values
+                ),
+                closure_f0=size,
+            )
+        )
+    return tuple(rows)

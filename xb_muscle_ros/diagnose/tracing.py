@@ -1,0 +1,148 @@
+"""Every trial sample by sample: as measured, as base and answer have it, and without each of the answer's parts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.diagnose.inference.direction import direction
+from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
+from xb_muscle_ros.diagnose.noise.cells import Residual
+from xb_muscle_ros.diagnose.noise.residuals import Around
+from xb_muscle_ros.diagnose.report.traces import TrialTraces
+from xb_muscle_ros.diagnose.result import Component
+from xb_muscle_ros.diagnose.search.system import Names
+from xb_muscle_ros.diagnose.search.whole import FRAMES, absent
+from xb_muscle_ros.diagnose.searching import Searched
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.problem import Problem
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Traced:
+    """One trial; forces in F0 at the times of its measured samples.
+
+    Attributes:
+        fibre: place of the fibre in the study.
+        residual: what the base left, with the trial's phases.
+        measured_f0, start_f0, before_f0, after_f0: measured, by the fibre file as given, base, answer.
+        heldout_before_f0, heldout_after_f0: predicted; None where nothing was left out.
+        without_f0: the answer without each of its parts, by name: its effect set to nothing, all else as fitted; of a
+            part that is another model, that model's absence fitted anew.
+        plain: for the file.
+    """
+
+    fibre: int
+    residual: Residual
+    measured_f0: Array
+    start_f0: Array
+    before_f0: Array
+    after_f0: Array
+    heldout_before_f0: Array | None
+    heldout_after_f0: Array | None
+    without_f0: Mapping[Name, Array]
+    plain: TrialTraces
+
+
+def traced(study: Searched, chosen: Names, before: Sequence[Around], after: Sequence[Around]) -> list[Traced]:
+    """All trials of all fibres."""
+    found: list[Traced] = []
+    heldout = study.judged.heldout
+    for i, recorded in enumerate(study.recorded):
+        starts = _start(study, i)
+        parts = {name: _without(study, chosen, name, i) for name in chosen}
+        residuals = study.recordings[i].residuals(before[i])
+        forces = [
+            [t.measured_f0 - r for t, r in zip(recorded.trials, around.by_trial(), strict=True)]
+            for around in (before[i], after[i])
+        ]
+        for k, trial in enumerate(recorded.trials):
+            without = {n: p[k] for n, p in parts.items() if p is not None}
+            held = [heldout.forces(names).get((i, trial.name)) for names in ((), chosen)]
+            plain = TrialTraces(
+                fibre=study.fibres[i].name,
+                trial=trial.name,
+                time_s=trial.force_time_s,
+                length_l0=np.interp(trial.force_time_s, trial.time_s, trial.length_l0),
+                measured_f0=trial.measured_f0,
+                start_f0=starts[k],
+                before_f0=forces[0][k],
+                after_f0=forces[1][k],
+                heldout_before_f0=held[0],
+                heldout_after_f0=held[1],
+                without_f0={n.value: force for n, force in without.items()},
+            )
+            found.append(
+                Traced(
+                    i,
+                    residuals[k],
+                    trial.measured_f0,
+                    starts[k],
+                    forces[0][k],
+                    forces[1][k],
+                    held[0],
+                    held[1],
+                    without,
+                    plain,
+                )  # fmt: skip
+            )
+    return found
+
+
+def _start(study: Searched, i: int) -> list[Array]:
+    """Recorded force by the fibre file as given; zeros where it has no solution."""
+    recorded = study.recorded[i]
+    try:
+        return Problem(study.fibres[i], recorded.trials, (), {}).predicted(np.empty(0))
+    except UserError:
+        return [np.zeros_like(t.measured_f0) for t in recorded.trials]
+
+
+def _without(study: Searched, chosen: Names, name: Name, i: int) -> list[Array] | None:
+    """The answer without one of its parts; None where the model has no solution then."""
+    recorded = study.recorded[i]
+    rest = tuple(n for n in chosen if n is not name)
+    fit = study.explorer.fits[chosen][i]
+    try:
+        if name in FRAMES:
+            if rest not in study.explorer.fits:
+                return None
+            problem = recorded.problem(rest, study.explorer.fits[rest][i].values)
+            return problem.predicted(problem.start)
+        problem = recorded.problem(chosen, fit.values)
+        z = problem.start.copy()
+        if name in MEASUREMENT:
+            for j, c in enumerate(problem.coordinates):
+                if c.name == name.value:
+                    z[j] = 0.0
+            return problem.predicted(z)
+        gone = absent(name)
+        kept = [j for j, c in enumerate(problem.coordinates) if c.name not in gone]
+        fibre = problem.fibre_at(z)
+        fibre = replace(fibre, values={**fibre.values, **gone})
+        bare = replace(
+            problem,
+            fibre=fibre,
+            coordinates=tuple(problem.coordinates[j] for j in kept),
+            correction=recorded.problem(rest, fit.values).correction if problem.correction is not None else None,
+        )
+        if bare.correction is not None:
+            bare = replace(bare, correction=replace(bare.correction, at=np.zeros(len(kept))))
+        return bare.predicted(z[kept])
+    except UserError:
+        return None
+
+
+def directed(study: Searched, c: Component, traces: Sequence[Traced]) -> Component:
+    """A component of the answer with what it does to the force."""
+    name = Name(c.members[0])
+    adds: dict[str, list[tuple[Residual, Array]]] = {}
+    for t in traces:
+        if name in t.without_f0:
+            adds.setdefault(study.fibres[t.fibre].name, []).append((t.residual, t.after_f0 - t.without_f0[name]))
+    return replace(c, direction=direction(adds)) if adds else c
