@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -50,14 +50,18 @@ class Refit:
         jacobian: at the true constants, (samples of all trials, fitted constants), F0.
     """
 
-    def __init__(self, base: World, study: Sequence[Stimulus]) -> None:
+    def __init__(
+        self, base: World, study: Sequence[Stimulus], dress: Callable[[World], Truth] = Truth, mesh: Mesh = _COARSE
+    ) -> None:
         """Take the Jacobian.
 
         Args:
             base: the plain world that the tool is given, with the true constants.
             study: stated calcium and recorded length of every trial.
+            dress: what is fitted besides the plain world's constants: effects that the model has as well.
+            mesh: resolution.
         """
-        self._base, self._study = base, list(study)
+        self._base, self._study, self._dress, self._mesh = base, list(study), dress, mesh
         self.names = tuple(name for name in _FITTED if name in base.values)
         self._at = np.zeros(len(self.names) + len(_PARALLEL_SD))
         self._plain = self._model(self._at)
@@ -141,7 +145,8 @@ class Refit:
         return values
 
     def _model(self, at: Array) -> Array:
-        return np.concatenate(study_forces(Truth(self._base.with_values(self._values(at))), self._study, _COARSE))
+        world = self._base.with_values(self._values(at))
+        return np.concatenate(study_forces(self._dress(world), self._study, self._mesh))
 
     def split(self, joined: Array) -> list[Array]:
         """Samples of all trials by trial."""
