@@ -60,7 +60,6 @@ class JudgedComposite(NamedTuple):
         effects: mechanisms that are concealed.
         outside: effects without a name that are.
         artefacts: of the measurement.
-        size_f0: what a refit of the base with ordinary errors leaves of all effects, F0.
         verdict: of the tool, or ``error``.
         named: mechanisms of the answer.
         artefacts_named: artefacts that the tool names.
@@ -77,7 +76,6 @@ class JudgedComposite(NamedTuple):
     effects: tuple[JudgedEffect, ...]
     outside: tuple[str, ...]
     artefacts: tuple[str, ...]
-    size_f0: float
     verdict: str
     named: tuple[JudgedName, ...]
     artefacts_named: tuple[JudgedName, ...]
@@ -119,7 +117,6 @@ def judge_composite(truth: Mapping[str, Any], found: Mapping[str, Any]) -> Judge
         ),
         outside=tuple(str(effect["label"]) for effect in truth["effects"] if effect["family"] is None),
         artefacts=tuple(artefacts),
-        size_f0=float(truth["size_f0"]),
         verdict=verdict,
         named=tuple(answer),
         artefacts_named=tuple(_judged(s, artefacts) for s in named(found, mechanisms=False)),

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.prove.generator.case import Concealed, dressed, full_enough, isometric_of, usable
 from xb_muscle_ros.prove.generator.composite_mix import FAULT, CompositeSpec
@@ -25,16 +26,27 @@ from xb_muscle_ros.prove.generator.world import Mesh, Stimulus, World
 Array = npt.NDArray[np.float64]
 
 # Draws of a fibre in which every effect has to be of the size that is meant, and draws in all.
-_STRICT, _ATTEMPTS = 8, 40
+_STRICT, _ATTEMPTS = 4, 40
 _LEAST_F0, _MOST_F0 = 0.003, 0.05
-_NEAR = 0.25
-_ROUNDS, _WEAKER = 2, 4
+_NEAR = 0.4
+_WEAKER = 4
+# True refits leave less than linear ones by about this factor.
+_LINEAR = 1.7
+# What one effect may change of the force before any refit (RMS), F0: more, and it is hardly one effect among others.
+_USUAL_CHANGE_F0 = 0.2
+# What stands in for a part of the base changes more.
+_CHANGE_F0 = {
+    name.value: 0.3
+    for name in (Name.SERIES_COMPLIANCE, Name.THIN_FILAMENT_COOPERATIVITY, Name.THICK_FILAMENT_COOPERATIVITY)
+}
 # What an artefact is to leave: force (F0), or an error that goes so many SDs of what is ordinary.
 _FAULT_F0, _FAULT_SD = 0.0015, 2.5
 # Differences and slopes want little: 1 ms steps are good to 0.05 % F0, the same with and without an effect.
 _COARSE = Mesh(steps=2, dx=0.2)
 _COARSEST = Mesh(steps=1, dx=0.2, still=1e-5)
 _LESS = 0.6
+# Effects that are brief or weak need more than single ones do to be of any size; the change of force bounds them.
+_MORE = {Name.VISCOUS_DRAG.value: 2.0, Name.WEAKLY_BOUND_HEADS.value: 3.0}
 
 
 class Composite(NamedTuple):
@@ -53,7 +65,6 @@ class Composite(NamedTuple):
         artefacts_left: what artefacts leave, F0, and the farthest that they pull an ordinary error, in its SDs.
         recorded: force as recorded, F0, noise and all, by trial.
         noise_sd: of each trial, F0.
-        left: what a refit of the plain base with ordinary errors leaves of all effects together, F0, by trial.
         before: RMS difference to the base with the true constants, F0, without errors of the measurement.
     """
 
@@ -69,7 +80,6 @@ class Composite(NamedTuple):
     artefacts_left: tuple[float, float] | None
     recorded: list[Array]
     noise_sd: list[float]
-    left: list[Array]
     before: float
 
     @property
@@ -110,7 +120,7 @@ def _attempt(spec: CompositeSpec, random: np.random.Generator, strict: bool) -> 
             return None
         ordinary = draw_ordinary(random, study)
         sized = Sized(base, study, ordinary)
-        concealed, sizes = sized.scaled(concealed, spec.sizes)
+        concealed, sizes = sized.scaled(concealed, spec.sizes, _LEAST_F0 if strict else 0.0)
         forces = study_forces(dressed(concealed, base), sized.stimuli)
         if usable(study, forces):
             break
@@ -131,13 +141,11 @@ def _attempt(spec: CompositeSpec, random: np.random.Generator, strict: bool) -> 
         forces = study_forces(dressed(concealed, base), _given(study, faults))
     shares = [float(force[0]) for force in forces]
     noises = [noise(random, f.size, share / max(shares)) for f, share in zip(forces, shares, strict=True)]
-    difference = sized.difference(concealed)
     return Composite(
         spec, fibre, given, dict(values), study, concealed, sizes, ordinary, faults, artefacts_left,
         recorded=[faults.recorded(f, i) + drawn for i, (f, (drawn, _)) in enumerate(zip(forces, noises, strict=True))],
         noise_sd=[sd for _, sd in noises],
-        left=sized.split(sized.plain.take(difference).left),
-        before=float(np.sqrt(np.mean(difference**2))),
+        before=float(np.sqrt(np.mean(sized.difference(concealed) ** 2))),
     )  # fmt: skip
 
 
@@ -159,20 +167,17 @@ class Sized:
         """Take slopes of the base."""
         self._base, self._study, self._ordinary = base, study, ordinary
         self.stimuli = _given(study, ordinary)
-        columns, self.constants = self._columns([])
-        self.plain = Rest(columns, len(study))
+        slopes = self._slopes(base, [])
+        self.constants = slopes.constants
+        self.plain = Rest(slopes.columns, len(study))
         self._plain_force = self._force([])
 
     def difference(self, concealed: Sequence[Concealed]) -> Array:
         """What effects change, F0, samples of all trials."""
         return self._force(concealed) - self._plain_force
 
-    def split(self, joined: Array) -> list[Array]:
-        """Samples of all trials by trial."""
-        return np.split(joined, np.cumsum([s.length.size for s in self.stimuli])[:-1])
-
     def of_faults(self, faults: Faults) -> Taken:
-        """What is left of all that artefacts change beyond the ordinary errors, by a refit of the base."""
+        """What is left of all that artefacts change beyond the ordinary errors, by a linear refit of the base."""
         world = dressed([], self._base)
         both = [
             [f.recorded(force, i) for i, force in enumerate(study_forces(world, _given(self._study, f), _COARSE))]
@@ -180,87 +185,141 @@ class Sized:
         ]
         return self.plain.take(np.concatenate(both[0]) - np.concatenate(both[1]))
 
-    def scaled(self, concealed: list[Concealed], sizes: Sequence[float]) -> tuple[list[Concealed], list[float]]:
+    def scaled(
+        self, concealed: list[Concealed], sizes: Sequence[float], least: float
+    ) -> tuple[list[Concealed], list[float]]:
         """Effects at scales that leave about what is asked for beside the rest, within what is plausible.
+
+        Args:
+            concealed: at usual scales.
+            sizes: asked for, F0.
+            least: no more is done where an effect leaves less than this even alone, F0.
 
         Returns:
             The effects, and what each leaves, F0; not finite where the fibre is not usable.
         """
         if not concealed:
             return [], []
-        concealed = self._kept([self._alone(c, size) for c, size in zip(concealed, sizes, strict=True)])
-        slopes, taken_at = self._columns(concealed), concealed
-        found = self._beside_rest(concealed, slopes)
-        for _ in range(_ROUNDS):
-            factors = [float(np.clip(s / max(f, 1e-9), 0.3, 3.0)) for s, f in zip(sizes, found, strict=True)]
-            # A size that is not finite fails every comparison: such a fibre is not usable.
-            if not max(abs(factor - 1.0) for factor in factors) >= _NEAR:
-                break
-            wanted = self._kept([_times(c, factor) for c, factor in zip(concealed, factors, strict=True)])
-            if wanted == concealed:
-                break
-            concealed, found = wanted, self._beside_rest(wanted, slopes)
-        if concealed != taken_at:
-            found = self._beside_rest(concealed, self._columns(concealed))
+        alone = [self._alone(c, _LINEAR * size) for c, size in zip(concealed, sizes, strict=True)]
+        # What leaves too little by itself leaves less beside others.
+        if not all(a.left >= least for a in alone):
+            return concealed, [a.left for a in alone]
+        concealed = self._kept([a.concealed for a in alone])
+        found = self.beside_rest(concealed)
+        factors = [float(np.clip(s / max(f, 1e-9), 0.3, 3.0)) for s, f in zip(sizes, found, strict=True)]
+        # A size that is not finite fails every comparison: such a fibre is not usable.
+        if max(abs(factor - 1.0) for factor in factors) >= _NEAR:
+            wanted = [
+                c._replace(scale=min(c.scale * factor, a.most))
+                for c, factor, a in zip(concealed, factors, alone, strict=True)
+            ]
+            wanted = self._kept(wanted)
+            if wanted != concealed:
+                concealed, found = wanted, self.beside_rest(wanted)
         return concealed, found
+
+    def _alone(self, concealed: Concealed, size: float) -> _Alone:
+        """The effect at a scale at which it alone leaves about so much, by linear refits."""
+        left, plausible = np.nan, EFFECTS[concealed.label].most * _MORE.get(concealed.label, 1.0)
+        most = plausible
+        for _ in range(4):
+            difference = self.difference([concealed])
+            left, change = self.plain.take(difference).rms, float(np.sqrt(np.mean(difference**2)))
+            factor = float(np.clip(size / max(left, 1e-9), 0.05, 20.0)) if np.isfinite(left) else 0.3
+            within = _CHANGE_F0.get(concealed.label, _USUAL_CHANGE_F0) / change if np.isfinite(change) else 0.3
+            most = min(plausible, concealed.scale * within)
+            wanted = concealed._replace(scale=min(concealed.scale * factor, most))
+            if abs(wanted.scale / concealed.scale - 1.0) < _NEAR:
+                break
+            concealed = wanted
+        return _Alone(concealed, left, most)
 
     def _kept(self, concealed: list[Concealed]) -> list[Concealed]:
         """So much less of all effects that the fibre is one that is kept; perhaps in vain."""
         for _ in range(_WEAKER):
-            if usable(self._study, self.split(self._force(concealed))):
+            if usable(self._study, self._split(self._force(concealed))):
                 break
-            concealed = [_times(c, _LESS) for c in concealed]
+            concealed = [c._replace(scale=_LESS * c.scale) for c in concealed]
         return concealed
 
-    def _alone(self, concealed: Concealed, size: float) -> Concealed:
-        """The effect at a scale at which it alone leaves about so much."""
-        for _ in range(4):
-            left = self.plain.take(self.difference([concealed])).rms
-            if not np.isfinite(left):
-                concealed = _times(concealed, 0.3)
-                continue
-            factor = float(np.clip(size / max(left, 1e-9), 0.05, 20.0))
-            concealed = _times(concealed, factor)
-            if abs(factor - 1.0) < _NEAR:
-                break
-        return concealed
-
-    def _beside_rest(self, concealed: Sequence[Concealed], slopes: tuple[Array, int]) -> list[float]:
+    def beside_rest(self, concealed: Sequence[Concealed]) -> list[float]:
         """What each effect leaves if the model has all others, and all that the model has is fitted again, F0."""
-        whole = self._force(concealed)
-        without = [self._force([c for j, c in enumerate(concealed) if j != i]) for i in range(len(concealed))]
-        columns, constants = slopes
-        rest = Rest(columns, len(self._study))
-        return [rest.without(constants + i).take(whole - other).rms for i, other in enumerate(without)]
+        data = self._force(concealed)
+        if not np.all(np.isfinite(data)):
+            return [np.nan] * len(concealed)
+        whole = self._slopes(self._base, concealed)
+        return [self._left_without(i, concealed, data, whole) for i in range(len(concealed))]
 
-    def _columns(self, concealed: Sequence[Concealed]) -> tuple[Array, int]:
-        """Slopes at a truth: constants, then logarithms of the effects' scales, then ordinary errors.
+    def _left_without(self, i: int, concealed: Sequence[Concealed], data: Array, whole: _Slopes) -> float:
+        """RMS that a refit of everything but effect i leaves, F0."""
+        others = [c for j, c in enumerate(concealed) if j != i]
+        # Constants, and scales of the others, by their logarithms; then errors, in SDs.
+        constants, coordinates = self.constants, self.constants + len(others)
+        columns = np.delete(whole.columns, constants + i, axis=1)
+        errors = columns[:, coordinates:]
 
-        Returns:
-            Shape (samples, coordinates); how many constants there are.
-        """
-        refit = Refit(self._base, self.stimuli, lambda world: dressed(concealed, world), _COARSEST)
-        plain = refit.plain()
+        def there(at: Array) -> tuple[World, list[Concealed]]:
+            changed = [c._replace(scale=c.scale * np.exp(s)) for c, s in zip(others, at[constants:], strict=False)]
+            return self._base.with_values(whole.refit.values_at(at[:constants])), changed
+
+        def model(at: Array) -> Array:
+            world, changed = there(at)
+            return (
+                np.concatenate(study_forces(dressed(changed, world), self.stimuli, _COARSEST))
+                + errors @ (at[coordinates:])
+            )
+
+        def slopes(at: Array) -> Array:
+            return np.column_stack([self._slopes(*there(at)).columns[:, :coordinates], errors])
+
+        return Rest(columns, len(self._study)).refit(data, model, slopes, coordinates).rms
+
+    def _slopes(self, base: World, concealed: Sequence[Concealed]) -> _Slopes:
+        """Slopes at a truth."""
+        refit = Refit(base, self.stimuli, lambda world: dressed(concealed, world), _COARSEST)
+        plain = np.concatenate(refit.plain())
         scales = []
         for i, c in enumerate(concealed):
             more = [*concealed[:i], c._replace(scale=1.05 * c.scale), *concealed[i + 1 :]]
-            scales.append((self._force(more, _COARSEST) - np.concatenate(plain)) / 0.05)
+            moved = study_forces(dressed(more, base), self.stimuli, _COARSEST)
+            scales.append((np.concatenate(moved) - plain) / 0.05)
         errors = error_columns(
             lambda shift, gain: study_forces(
-                dressed(concealed, self._base), [_moved(s, shift, gain) for s in self.stimuli], _COARSEST
+                dressed(concealed, base), [_moved(s, shift, gain) for s in self.stimuli], _COARSEST
             ),
-            self._study, plain, ORDINARY,
+            self._study, refit.plain(), ORDINARY,
         )  # fmt: skip
-        return np.column_stack([refit.jacobian, *scales, *errors]), refit.jacobian.shape[1]
+        return _Slopes(refit, np.column_stack([refit.jacobian, *scales, *errors]), refit.jacobian.shape[1])
 
-    def _force(self, concealed: Sequence[Concealed], mesh: Mesh = _COARSEST) -> Array:
-        return np.concatenate(study_forces(dressed(concealed, self._base), self.stimuli, mesh))
+    def _force(self, concealed: Sequence[Concealed]) -> Array:
+        return np.concatenate(study_forces(dressed(concealed, self._base), self.stimuli, _COARSEST))
+
+    def _split(self, joined: Array) -> list[Array]:
+        return np.split(joined, np.cumsum([s.length.size for s in self.stimuli])[:-1])
+
+
+class _Alone(NamedTuple):
+    """An effect as it is alone, what it leaves by a linear refit, F0, and the scale that is not to be exceeded."""
+
+    concealed: Concealed
+    left: float
+    most: float
+
+
+class _Slopes(NamedTuple):
+    """Change of all forces, F0, by one prior SD of each coordinate.
+
+    Attributes:
+        refit: of constants.
+        columns: constants, then logarithms of the effects' scales, then ordinary errors; shape (samples, coordinates).
+        constants: how many there are.
+    """
+
+    refit: Refit
+    columns: Array
+    constants: int
 
 
 def _moved(stimulus: Stimulus, shift: float, gain: float) -> Stimulus:
     """The same at a pCa higher by `shift`, with length changes larger by `gain`."""
     return Stimulus((1.0 + gain) * stimulus.length, stimulus.calcium * 10.0**-shift)
-
-
-def _times(concealed: Concealed, factor: float) -> Concealed:
-    return concealed._replace(scale=min(concealed.scale * factor, EFFECTS[concealed.label].most))

@@ -93,7 +93,7 @@ class Refit:
             at, model, jacobian = start.at, found, self._jacobian_at(start.at, found)
         at, model = self._descend(data, at, model, jacobian)
         left = data - model
-        return Refitted(float(np.sqrt(np.mean(left**2))), self.split(left), self._values(at), at)
+        return Refitted(float(np.sqrt(np.mean(left**2))), self.split(left), self.values_at(at), at)
 
     def _descend(self, data: Array, at: Array, model: Array, jacobian: Array) -> tuple[Array, Array]:
         """Damped Gauss-Newton steps, the Jacobian taken anew after each.
@@ -136,7 +136,8 @@ class Refit:
         step: Array = np.linalg.solve(curvature, self._weight**2 * jacobian.T @ r - at)
         return step
 
-    def _values(self, at: Array) -> dict[str, float]:
+    def values_at(self, at: Array) -> dict[str, float]:
+        """Constants where their coordinates are so."""
         values = {
             name: float(self._base.values[name] * np.exp(change)) for name, change in zip(self.names, at, strict=False)
         }
@@ -145,7 +146,7 @@ class Refit:
         return values
 
     def _model(self, at: Array) -> Array:
-        world = self._base.with_values(self._values(at))
+        world = self._base.with_values(self.values_at(at))
         return np.concatenate(study_forces(self._dress(world), self._study, self._mesh))
 
     def split(self, joined: Array) -> list[Array]:

@@ -113,7 +113,6 @@ def composite_entry(case: Composite, name: str) -> dict[str, Any]:
         "artefacts": list(spec.artefacts),
         "artefacts_left_f0": left_f0,
         "artefacts_left_sd": left_sd,
-        "size_f0": _rms(case.left),
         "before_refit_f0": case.before,
         "faults": _of_faults(case.faults),
         "ordinary": _of_faults(case.ordinary),
