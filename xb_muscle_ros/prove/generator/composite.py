@@ -30,8 +30,7 @@ _STRICT, _ATTEMPTS = 4, 40
 _LEAST_F0, _MOST_F0 = 0.003, 0.05
 _NEAR = 0.4
 _WEAKER = 4
-# True refits leave less than linear ones by about this factor.
-_LINEAR = 1.7
+_LINEAR, _BESIDE = 1.7, 0.3
 # What one effect may change of the force before any refit (RMS), F0: more, and it is hardly one effect among others.
 _USUAL_CHANGE_F0 = 0.2
 # What stands in for a part of the base changes more.
@@ -128,7 +127,7 @@ def _attempt(spec: CompositeSpec, random: np.random.Generator, strict: bool) -> 
             return None
     else:
         return None
-    if strict and not all(_LEAST_F0 <= size <= (1.0 + _NEAR) * _MOST_F0 for size in sizes):
+    if strict and not all(_LEAST_F0 <= size <= _MOST_F0 for size in sizes):
         return None
     faults = with_artefacts(spec.artefacts, random, study, ordinary)
     artefacts_left = None
@@ -200,20 +199,23 @@ class Sized:
         """
         if not concealed:
             return [], []
-        alone = [self._alone(c, _LINEAR * size) for c, size in zip(concealed, sizes, strict=True)]
+        # True refits leave less than linear ones, and less beside others than alone.
+        more = _LINEAR * (1.0 + _BESIDE * (len(concealed) - 1))
+        alone = [self._alone(c, more * size) for c, size in zip(concealed, sizes, strict=True)]
         # What leaves too little by itself leaves less beside others.
         if not all(a.left >= least for a in alone):
             return concealed, [a.left for a in alone]
         concealed = self._kept([a.concealed for a in alone])
         found = self.beside_rest(concealed)
-        factors = [float(np.clip(s / max(f, 1e-9), 0.3, 3.0)) for s, f in zip(sizes, found, strict=True)]
         # A size that is not finite fails every comparison: such a fibre is not usable.
-        if max(abs(factor - 1.0) for factor in factors) >= _NEAR:
-            wanted = [
-                c._replace(scale=min(c.scale * factor, a.most))
-                for c, factor, a in zip(concealed, factors, alone, strict=True)
-            ]
-            wanted = self._kept(wanted)
+        if any(size < _LEAST_F0 or size > _MOST_F0 for size in found):
+            factors = [float(np.clip(s / max(f, 1e-9), 0.3, 3.0)) for s, f in zip(sizes, found, strict=True)]
+            wanted = self._kept(
+                [
+                    c._replace(scale=min(c.scale * factor, a.most))
+                    for c, factor, a in zip(concealed, factors, alone, strict=True)
+                ]
+            )
             if wanted != concealed:
                 concealed, found = wanted, self.beside_rest(wanted)
         return concealed, found
