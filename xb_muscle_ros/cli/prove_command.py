@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from xb_muscle_ros.cli.common import add_overwrite, add_work, work_options_of
+from xb_muscle_ros.prove.sealing import KINDS, SINGLES
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
@@ -27,6 +28,11 @@ def add(subparsers: Subparsers) -> None:
     make.add_argument("--cases", type=int, required=True, metavar="N", help="how many")
     make.add_argument("--seed", type=int, required=True, metavar="S", help="decides everything: keep it as the key")
     make.add_argument("--key", type=Path, required=True, metavar="FILE", help="file for the truths, outside of DIR")
+    make.add_argument(
+        "--kind", choices=KINDS, default=SINGLES,
+        help="singles: at most one thing or a pair is concealed; composites: up to four mechanisms, each case with "
+        "ordinary error of the measurement (default: singles)",
+    )  # fmt: skip
     make.add_argument("--method", default="gaussian", help="method that the fibre files name (default: gaussian)")
     add_overwrite(make)
     add_work(make)
@@ -63,8 +69,9 @@ def _make(arguments: argparse.Namespace) -> int:
 
     options = _checked(arguments, "prove make")
     sealed = make(
-        arguments.out, arguments.cases, arguments.seed, arguments.key, arguments.method, options, arguments.overwrite
-    )
+        arguments.out, arguments.cases, arguments.seed, arguments.key, arguments.method, options, arguments.overwrite,
+        arguments.kind,
+    )  # fmt: skip
     return _sealed(arguments, sealed)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import beta
+from scipy.stats import binomtest
 
 from xb_muscle_ros.diagnose.names import Verdict
 from xb_muscle_ros.prove.judging import Judged
@@ -50,9 +50,8 @@ class Score(NamedTuple):
 
 def interval(hits: int, n: int) -> tuple[float, float]:
     """Clopper–Pearson 95 % interval of a share; n at least 1."""
-    lower = 0.0 if hits == 0 else float(beta.ppf(0.025, hits, n - hits + 1))
-    upper = 1.0 if hits == n else float(beta.ppf(0.975, hits + 1, n - hits))
-    return lower, upper
+    found = binomtest(hits, n).proportion_ci(0.95, method="exact")
+    return float(found.low), float(found.high)
 
 
 def share(name: str, meaning: str, hits: Iterable[bool], bar: float | None = None, at_most: bool = False) -> Score:
@@ -62,6 +61,16 @@ def share(name: str, meaning: str, hits: Iterable[bool], bar: float | None = Non
         return Score(name, meaning, None, 0, None, None, bar, at_most)
     lower, upper = interval(sum(found), len(found))
     return Score(name, meaning, sum(found) / len(found), len(found), lower, upper, bar, at_most)
+
+
+def median(name: str, meaning: str, values: Sequence[float], bar: float | None = None) -> Score:
+    """Median over cases, with a bootstrap interval."""
+    if not values:
+        return Score(name, meaning, None, 0, None, None, bar)
+    found, random = np.array(values), np.random.default_rng(1)
+    drawn = np.median(found[random.integers(0, found.size, (2000, found.size))], axis=1)
+    lower, upper = np.percentile(drawn, [2.5, 97.5])
+    return Score(name, meaning, float(np.median(found)), found.size, float(lower), float(upper), bar)
 
 
 def scores(judged: Sequence[Judged]) -> list[Score]:
@@ -131,14 +140,8 @@ def calibration(judged: Sequence[Judged]) -> dict[str, Any]:
 
 def _gain(singles: Sequence[Judged]) -> Score:
     """Median held-out gain of effects named right, over that of the true model."""
-    gains = np.array([j.gain for j in singles if j.exact and _says_physics(j) and j.gain is not None])
-    text = "held-out gain over the gain of the true model, effects named right (median)"
-    if not gains.size:
-        return Score("gain", text, None, 0, None, None, 0.8)
-    random = np.random.default_rng(1)
-    drawn = np.median(gains[random.integers(0, gains.size, (2000, gains.size))], axis=1)
-    lower, upper = np.percentile(drawn, [2.5, 97.5])
-    return Score("gain", text, float(np.median(gains)), gains.size, float(lower), float(upper), 0.8)
+    gains = [j.gain for j in singles if j.exact and _says_physics(j) and j.gain is not None]
+    return median("gain", "held-out gain over the gain of the true model, effects named right (median)", gains, 0.8)
 
 
 def _says_physics(j: Judged) -> bool:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from xb_muscle_ros.diagnose.names import FAMILY, MECHANISMS, Name, Verdict
+from xb_muscle_ros.diagnose.names import FAMILY, Name, Verdict
+from xb_muscle_ros.prove.stated import NAMES, family_of, first_names, named, probability_of
 
-_PHYSICS = {name.value for name in MECHANISMS}
-_NAMES = {name.value for name in Name}
 # A global change of rates is what parameters are for: to call it so is right as well.
 _AS_GOOD_AS_PARAMETERS = {Name.TEMPERATURE.value, Name.PHOSPHATE.value}
 NO_DIAGNOSIS = "error"
@@ -31,7 +30,7 @@ class Judged(NamedTuple):
         located: the first mismatch is where what a refit leaves is at least half as large as anywhere; None without.
         located_beside_nuisances: the same with what a refit of constants and usual faults leaves.
         gain: held-out gain over that of the true model; None unless before and after are known.
-        confidence: as the tool states it.
+        confidence: as the tool states it; in format 2 the inclusion probability of its first name.
         seconds: that the tool took.
     """
 
@@ -61,12 +60,12 @@ def judge(truth: Mapping[str, Any], found: Mapping[str, Any]) -> Judged:
     """
     labels = tuple(truth["labels"])
     verdict = NO_DIAGNOSIS if "error" in found else str(found["verdict"])
-    names = [str(name) for name in found.get("answer") or ()]
+    names = first_names(found, verdict)
     speaks = verdict in (Verdict.PHYSICS.value, Verdict.MEASUREMENT.value, Verdict.AMBIGUOUS.value)
     first = names[0] if names and speaks else None
     exact = first in labels
-    families = {FAMILY[Name(label)] for label in labels if label in _NAMES}
-    family = first in _NAMES and FAMILY[Name(first)] in families
+    families = {FAMILY[Name(label)] for label in labels if label in NAMES}
+    family = first is not None and family_of(first, found) in families
     if speaks and first is None:
         family = found.get("family") in families
     if set(labels) & _AS_GOOD_AS_PARAMETERS and verdict in (Verdict.PARAMETERS.value, Verdict.NONE.value):
@@ -79,13 +78,14 @@ def judge(truth: Mapping[str, Any], found: Mapping[str, Any]) -> Judged:
         size_class_f0=truth["size_class_f0"],
         verdict=verdict,
         answer=first or verdict,
-        physics=verdict == Verdict.PHYSICS.value or (verdict == Verdict.AMBIGUOUS.value and bool(_PHYSICS & {*names})),
+        physics=verdict == Verdict.PHYSICS.value
+        or (verdict == Verdict.AMBIGUOUS.value and bool(named(found, mechanisms=True))),
         exact=exact,
         family=family,
         located=_located(truth, found, "rms_f0"),
         located_beside_nuisances=_located(truth, found, "beside_nuisances_f0"),
-        gain=_gain(truth, found),
-        confidence=found.get("confidence"),
+        gain=heldout_gain(truth, found),
+        confidence=found.get("confidence") if "components" not in found else probability_of(first or "", found),
         seconds=found.get("seconds"),
     )
 
@@ -99,7 +99,8 @@ def _located(truth: Mapping[str, Any], found: Mapping[str, Any], size: str) -> b
     return bool(here) and max(here) >= 0.5 * largest
 
 
-def _gain(truth: Mapping[str, Any], found: Mapping[str, Any]) -> float | None:
+def heldout_gain(truth: Mapping[str, Any], found: Mapping[str, Any]) -> float | None:
+    """Held-out gain over that of the true model; None unless before and after are known."""
     before, after, noise = found.get("before_heldout_f0"), found.get("after_heldout_f0"), truth["noise_rms_f0"]
     if before is None or after is None or noise is None or before <= noise:
         return None

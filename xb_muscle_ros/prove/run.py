@@ -105,7 +105,17 @@ def needed(diagnosis: Mapping[str, Any]) -> dict[str, JsonValue]:
         "family": diagnosis.get("family"),
         "p_value": diagnosis.get("p_value"),
         "confidence": diagnosis.get("confidence"),
+        **_components(diagnosis),
         "first_mismatch": {key: mismatch[0][key] for key in ("trial", "phase", "size_f0")} if mismatch else None,
         "before_heldout_f0": before.get("heldout_rmsd_f0"),
         "after_heldout_f0": after.get("heldout_rmsd_f0"),
     }
+
+
+_OF_COMPONENT = ("name", "kind", "family", "members", "inclusion_probability")
+
+
+def _components(diagnosis: Mapping[str, Any]) -> dict[str, JsonValue]:
+    """What the scoring needs of the components; nothing in format 1, which has none."""
+    rows = diagnosis.get("components")
+    return {} if rows is None else {"components": [{key: row[key] for key in _OF_COMPONENT} for row in rows]}

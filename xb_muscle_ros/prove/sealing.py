@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import matching
 
 BENCHMARK = "benchmark.json"
+SINGLES, COMPOSITES = KINDS = ("singles", "composites")
+"""Kinds of benchmark: at most one thing or a pair is concealed; or several, on top of ordinary error."""
 
 
 def older_cases(folder: Path) -> list[Path]:
@@ -55,6 +58,11 @@ def load_benchmark(folder: Path) -> dict[str, Any]:
     except (OSError, ValueError, KeyError):
         pass
     raise UserError(f"{path} is no benchmark; give the folder that 'prove make' or 'prove run' wrote")
+
+
+def kind_of(tree: Mapping[str, Any]) -> str:
+    """Kind of a benchmark by its public description or key; older ones do not say it."""
+    return str(tree.get("kind", SINGLES))
 
 
 def open_key(key: Path, benchmark: dict[str, Any]) -> dict[str, Any]:

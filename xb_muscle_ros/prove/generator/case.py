@@ -71,6 +71,11 @@ class Case(NamedTuple):
     before: float
     beside_nuisances: list[Array]
 
+    @property
+    def model(self) -> str:
+        """That the tool is given."""
+        return self.spec.model
+
 
 def make_case(spec: Spec, seed: int, number: int) -> Case:
     """Draw until the fibre is one that a physiologist would have kept.
@@ -93,18 +98,18 @@ def _attempt(spec: Spec, random: np.random.Generator) -> Case | None:
     given = nominal(fibre, spec.model)
     values = drawn_around(given, random)
     base = World(spec.model, values)
-    if not _FULL[0] <= isometric(base, 10.0**1.5) <= _FULL[1]:
+    if not full_enough(base):
         return None
     concealed = [Concealed(label, EFFECTS[label].start, EFFECTS[label].draw(random)) for label in _effects_of(spec)]
     # Levels of calcium are chosen by what the fibre does, which its effects change; so perhaps twice.
     for _ in range(2):
-        study = plan(random, _isometric_of(concealed, base), spec.model.endswith("_rigid"))
+        study = plan(random, isometric_of(concealed, base), spec.model.endswith("_rigid"))
         if study is None:
             return None
         refit = Refit(base, [trial.stimulus() for trial in study])
         faults = draw_faults(spec.labels[0], random, study) if spec.kind == "fault" else Faults()
         concealed, forces, refitted = conceal(spec, concealed, base, study, faults, refit)
-        if _usable(study, forces):
+        if usable(study, forces):
             return _finished(spec, random, fibre, given, base, study, concealed, faults, forces, refit, refitted)
         if not concealed:
             return None
@@ -133,9 +138,14 @@ def _effects_of(spec: Spec) -> tuple[str, ...]:
     return spec.labels if spec.size is not None else ()
 
 
-def _isometric_of(concealed: Sequence[Concealed], base: World) -> Callable[[float], float]:
+def full_enough(base: World) -> bool:
+    """Whether a fibre's force at full activation is one of a fibre that is kept."""
+    return _FULL[0] <= isometric(base, 10.0**1.5) <= _FULL[1]
+
+
+def isometric_of(concealed: Sequence[Concealed], base: World) -> Callable[[float], float]:
     """Isometric force at a pCa, F0, of the fibre with its effects."""
-    truth = _truth(concealed, base)
+    truth = dressed(concealed, base)
     rest = np.zeros(2)
 
     @functools.cache
@@ -164,7 +174,7 @@ def conceal(
     refitted, most = None, np.inf
     for rounds in range(_ROUNDS):
         forces = _forces(concealed, base, study)
-        if not _usable(study, forces) and rounds < _ROUNDS - 1:
+        if not usable(study, forces) and rounds < _ROUNDS - 1:
             # So much of it and nobody would have kept the fibre: less, and never again as much.
             concealed, most = _times(concealed, _LESS), 1.0
             continue
@@ -200,7 +210,8 @@ def _scale_alone(concealed: Concealed, base: World, study: list[Planned], refit:
     return scale
 
 
-def _truth(concealed: Sequence[Concealed], base: World) -> Truth:
+def dressed(concealed: Sequence[Concealed], base: World) -> Truth:
+    """The fibre with its effects."""
     truth = Truth(base)
     for label, scale, shape in concealed:
         truth = EFFECTS[label].apply(truth, scale, shape)
@@ -208,10 +219,10 @@ def _truth(concealed: Sequence[Concealed], base: World) -> Truth:
 
 
 def _forces(concealed: Sequence[Concealed], base: World, study: Sequence[Planned]) -> list[Array]:
-    return study_forces(_truth(concealed, base), [trial.stimulus() for trial in study])
+    return study_forces(dressed(concealed, base), [trial.stimulus() for trial in study])
 
 
-def _usable(study: Sequence[Planned], forces: Sequence[Array]) -> bool:
+def usable(study: Sequence[Planned], forces: Sequence[Array]) -> bool:
     """Whether the fibre is plausible: finite, strong, steady at first, and at three levels between rest and full."""
     if not all(np.all(np.isfinite(force)) and np.max(np.abs(force)) < 6.0 for force in forces):
         return False

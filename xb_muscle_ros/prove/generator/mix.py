@@ -14,8 +14,14 @@ from xb_muscle_ros.prove.generator.effects import EFFECTS, OUTSIDE
 SHARES = {"null": 0.2, "fault": 0.2, "single": 0.4, "pair": 0.1, "outside": 0.1}
 SIZES = (0.005, 0.01, 0.02, 0.04)
 """RMS that an effect leaves after a refit, F0."""
-# How often a model is given where the effect leaves it open.
-_MODELS = {"3state_coop": 0.5, "2state_coop": 0.2, "2state": 0.15, "3state_coop_rigid": 0.1, "2state_coop_rigid": 0.05}
+MODEL_SHARES = {
+    "3state_coop": 0.5,
+    "2state_coop": 0.2,
+    "2state": 0.15,
+    "3state_coop_rigid": 0.1,
+    "2state_coop_rigid": 0.05,
+}
+"""How often a model is given where the effect leaves it open."""
 
 
 class Spec(NamedTuple):
@@ -38,12 +44,12 @@ def specs(cases: int, seed: int) -> list[Spec]:
     """All cases in the order of their numbers, which tells nothing."""
     random = np.random.default_rng([seed, 0])
     counts = _counts(cases)
-    made = [Spec("null", (), None, _model(random, tuple(_MODELS))) for _ in range(counts["null"])]
+    made = [Spec("null", (), None, drawn_model(random, tuple(MODEL_SHARES))) for _ in range(counts["null"])]
     for label in _turns(random, [name.value for name in MEASUREMENT], counts["fault"]):
-        made.append(Spec("fault", (label,), None, _model(random, tuple(_MODELS))))
+        made.append(Spec("fault", (label,), None, drawn_model(random, tuple(MODEL_SHARES))))
     for kind, labels in (("single", [name.value for name in MECHANISMS]), ("outside", list(OUTSIDE))):
         for label, size in _sized(random, labels, counts[kind]):
-            made.append(Spec(kind, (label,), size, _model(random, EFFECTS[label].models)))
+            made.append(Spec(kind, (label,), size, drawn_model(random, EFFECTS[label].models)))
     sizes = _turns(random, SIZES, counts["pair"])
     for size in sizes:
         made.append(_pair(random, size))
@@ -56,7 +62,7 @@ def spike_specs(cases: int, seed: int, model: str) -> list[Spec]:
     bare = round(0.2 * cases)
     possible = [name.value for name in MECHANISMS if model in EFFECTS[name.value].models]
     if not possible:
-        raise UserError(f"model {model} can have no effect of the generator; allowed are {', '.join(_MODELS)}")
+        raise UserError(f"model {model} can have no effect of the generator; allowed are {', '.join(MODEL_SHARES)}")
     made = [Spec("null", (), None, model) for _ in range(bare)]
     made += [Spec("single", (label,), size, model) for label, size in _sized(random, possible, cases - bare)]
     return [made[i] for i in random.permutation(len(made))]
@@ -98,9 +104,10 @@ def _pair(random: np.random.Generator, size: float) -> Spec:
         a, b = (names[i] for i in random.choice(len(names), 2, replace=False))
         both = tuple(model for model in EFFECTS[a.value].models if model in EFFECTS[b.value].models)
         if FAMILY[a] != FAMILY[b] and both:
-            return Spec("pair", (a.value, b.value), size, _model(random, both))
+            return Spec("pair", (a.value, b.value), size, drawn_model(random, both))
 
 
-def _model(random: np.random.Generator, allowed: Sequence[str]) -> str:
-    weights = np.array([_MODELS[model] for model in allowed])
+def drawn_model(random: np.random.Generator, allowed: Sequence[str]) -> str:
+    """One of the models, by their shares."""
+    weights = np.array([MODEL_SHARES[model] for model in allowed])
     return str(random.choice(list(allowed), p=weights / weights.sum()))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -30,8 +30,12 @@ def left_beside_nuisances(base: World, study: Sequence[Planned], refit: Refit, r
     left = np.concatenate(refitted.left)
     if not np.any(left):
         return list(refitted.left)
-    faults = _columns(base, study, refit.plain())
-    jacobian = np.column_stack([refit.jacobian, *faults])
+    truth, sizes = Truth(base), {name: prior.sd for name, prior in PRIORS.items()}
+    columns = error_columns(
+        lambda shift, gain: study_forces(truth, [trial.stimulus(shift, gain) for trial in study]),
+        study, refit.plain(), sizes,
+    )  # fmt: skip
+    jacobian = np.column_stack([refit.jacobian, *columns])
     weight = np.sqrt(_WORTH * len(study) / left.size) / _WORTH_SD
     a = np.vstack([weight * jacobian, np.eye(jacobian.shape[1])])
     b = np.concatenate([weight * left, np.zeros(jacobian.shape[1])])
@@ -39,30 +43,41 @@ def left_beside_nuisances(base: World, study: Sequence[Planned], refit: Refit, r
     return refit.split(left - jacobian @ solution)
 
 
-def _columns(base: World, study: Sequence[Planned], plain: list[Array]) -> list[Array]:
-    """Change of all forces by one SD of each fault."""
-    truth = Truth(base)
-    sd = {name: prior.sd for name, prior in PRIORS.items()}
+def error_columns(
+    forces: Callable[[float, float], Sequence[Array]], study: Sequence[Planned], plain: Sequence[Array],
+    sizes: Mapping[str, float],
+) -> list[Array]:  # fmt: skip
+    """Change of all forces by one SD of each error of the measurement.
+
+    Args:
+        forces: of every trial, F0, where pCa is so much higher and length changes are so much larger.
+        study: planned trials.
+        plain: forces without errors.
+        sizes: SD by name of the error: pCa of each solution, length gain, run-down, delay, offset and drift of each
+            trial. Those that are not named are left out.
+    """
 
     def of_trials(parts: Sequence[Array | None]) -> Array:
         return np.concatenate([np.zeros(f.size) if p is None else p for p, f in zip(parts, plain, strict=True)])
 
-    shifted = study_forces(truth, [trial.stimulus(shift=_SHIFT) for trial in study])
-    by_shift = [(a - b) * sd[Name.PCA_SHIFT.value] / _SHIFT for a, b in zip(shifted, plain, strict=True)]
-    gained = study_forces(truth, [trial.stimulus(gain=_GAIN) for trial in study])
-    columns = [
-        of_trials([part if trial.pca == pca else None for part, trial in zip(by_shift, study, strict=True)])
-        for pca in sorted({trial.pca for trial in study})
-    ]
-    columns.append(
-        of_trials([(a - b) * sd[Name.LENGTH_GAIN.value] / _GAIN for a, b in zip(gained, plain, strict=True)])
-    )
-    columns.append(of_trials([-i * sd[Name.RUN_DOWN.value] * force for i, force in enumerate(plain)]))
-    columns.append(of_trials([-sd[Name.TIME_SHIFT.value] * np.gradient(force, SAMPLE_S) for force in plain]))
+    columns = []
+    if (sd := sizes.get(Name.PCA_SHIFT.value)) is not None:
+        by_shift = [(a - b) * sd / _SHIFT for a, b in zip(forces(_SHIFT, 0.0), plain, strict=True)]
+        for pca in sorted({trial.pca for trial in study}):
+            columns.append(
+                of_trials([part if trial.pca == pca else None for part, trial in zip(by_shift, study, strict=True)])
+            )
+    if (sd := sizes.get(Name.LENGTH_GAIN.value)) is not None:
+        columns.append(of_trials([(a - b) * sd / _GAIN for a, b in zip(forces(0.0, _GAIN), plain, strict=True)]))
+    if (sd := sizes.get(Name.RUN_DOWN.value)) is not None:
+        columns.append(of_trials([-i * sd * force for i, force in enumerate(plain)]))
+    if (sd := sizes.get(Name.TIME_SHIFT.value)) is not None:
+        columns.append(of_trials([-sd * np.gradient(force, SAMPLE_S) for force in plain]))
     for i, force in enumerate(plain):
         for name, shape in (
             (Name.FORCE_OFFSET, np.ones(force.size)),
             (Name.FORCE_DRIFT, np.arange(force.size) * SAMPLE_S),
         ):
-            columns.append(of_trials([sd[name.value] * shape if j == i else None for j in range(len(plain))]))
+            if (sd := sizes.get(name.value)) is not None:
+                columns.append(of_trials([sd * shape if j == i else None for j in range(len(plain))]))
     return columns

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -50,14 +50,18 @@ class Refit:
         jacobian: at the true constants, (samples of all trials, fitted constants), F0.
     """
 
-    def __init__(self, base: World, study: Sequence[Stimulus]) -> None:
+    def __init__(
+        self, base: World, study: Sequence[Stimulus], dress: Callable[[World], Truth] = Truth, mesh: Mesh = _COARSE
+    ) -> None:
         """Take the Jacobian.
 
         Args:
             base: the plain world that the tool is given, with the true constants.
             study: stated calcium and recorded length of every trial.
+            dress: what is fitted besides the plain world's constants: effects that the model has as well.
+            mesh: resolution.
         """
-        self._base, self._study = base, list(study)
+        self._base, self._study, self._dress, self._mesh = base, list(study), dress, mesh
         self.names = tuple(name for name in _FITTED if name in base.values)
         self._at = np.zeros(len(self.names) + len(_PARALLEL_SD))
         self._plain = self._model(self._at)
@@ -89,7 +93,7 @@ class Refit:
             at, model, jacobian = start.at, found, self._jacobian_at(start.at, found)
         at, model = self._descend(data, at, model, jacobian)
         left = data - model
-        return Refitted(float(np.sqrt(np.mean(left**2))), self.split(left), self._values(at), at)
+        return Refitted(float(np.sqrt(np.mean(left**2))), self.split(left), self.values_at(at), at)
 
     def _descend(self, data: Array, at: Array, model: Array, jacobian: Array) -> tuple[Array, Array]:
         """Damped Gauss-Newton steps, the Jacobian taken anew after each.
@@ -132,7 +136,8 @@ class Refit:
         step: Array = np.linalg.solve(curvature, self._weight**2 * jacobian.T @ r - at)
         return step
 
-    def _values(self, at: Array) -> dict[str, float]:
+    def values_at(self, at: Array) -> dict[str, float]:
+        """Constants where their coordinates are so."""
         values = {
             name: float(self._base.values[name] * np.exp(change)) for name, change in zip(self.names, at, strict=False)
         }
@@ -141,7 +146,8 @@ class Refit:
         return values
 
     def _model(self, at: Array) -> Array:
-        return np.concatenate(study_forces(Truth(self._base.with_values(self._values(at))), self._study, _COARSE))
+        world = self._base.with_values(self.values_at(at))
+        return np.concatenate(study_forces(self._dress(world), self._study, self._mesh))
 
     def split(self, joined: Array) -> list[Array]:
         """Samples of all trials by trial."""

@@ -1,4 +1,4 @@
-"""The study of a case: seven trials of one fibre as a physiologist would plan them."""
+"""The study of a case: trials of one fibre as a physiologist would plan them, seven or more."""
 
 from __future__ import annotations
 
@@ -17,6 +17,9 @@ Piece = tuple[str, float, float]
 
 TRIALS = 7
 LONGEST_S = 2.5
+# From so many trials on there is one more level of calcium, and more than one relaxed trial.
+_MORE_LEVELS = (10, 15, 23)
+_RELAXED_AGAIN = 12
 
 
 class Planned(NamedTuple):
@@ -41,13 +44,16 @@ class Planned(NamedTuple):
         return Stimulus((1.0 + gain) * self.length, 10.0 ** (6.0 - self.pca - shift))
 
 
-def plan(random: np.random.Generator, force_of: Callable[[float], float], gentle: bool) -> list[Planned] | None:
-    """Seven trials: relaxed, fully active and at three or more levels between; stretches, ramps and a release.
+def plan(
+    random: np.random.Generator, force_of: Callable[[float], float], gentle: bool, trials: int = TRIALS
+) -> list[Planned] | None:
+    """Trials: relaxed, fully active and at three or more levels between; stretches, ramps and a release.
 
     Args:
         random: decides.
         force_of: isometric force at a pCa, F0.
         gentle: slower and smaller, for a fibre without series spring.
+        trials: how many, at least `TRIALS`; the more there are, the more levels of calcium.
 
     Returns:
         In the order of recording; None where there are no three levels of calcium with 15 to 85 % of the force.
@@ -57,19 +63,30 @@ def plan(random: np.random.Generator, force_of: Callable[[float], float], gentle
     between = [float(p) for p in grid if 0.15 * full <= force_of(float(p)) <= 0.85 * full]
     if len(between) < 3:
         return None
-    chosen = _spread_over(random, between)
-    levels = [9.0, 4.5, *chosen, *random.choice([*chosen, 4.5], 2, replace=False)]
-    kinds = ["paper", "paper", "slow", "fast", "release"]
-    random.shuffle(kinds)
+    chosen = _spread_over(random, between, _levels(trials))
+    levels = [9.0, 4.5, *chosen]
+    again = [*chosen, 4.5] if trials < _RELAXED_AGAIN else [*chosen, 4.5, 9.0]
+    while len(levels) < trials:
+        levels += [float(p) for p in random.choice(again, min(len(again) // 2, trials - len(levels)), replace=False)]
+    kinds: list[str] = []
+    while len(kinds) < trials - 2:
+        more = ["paper", "paper", "slow", "fast", "release"]
+        random.shuffle(more)
+        kinds += more
     first = [str(kind) for kind in random.choice(["paper", "slow", "fast"], 2)]
-    trials = [_trial(random, kind, float(pca), gentle) for kind, pca in zip([*first, *kinds], levels, strict=True)]
-    return [trials[i] for i in random.permutation(TRIALS)]
+    planned = [_trial(random, kind, pca, gentle) for kind, pca in zip([*first, *kinds], levels, strict=False)]
+    return [planned[i] for i in random.permutation(trials)]
 
 
-def _spread_over(random: np.random.Generator, between: Sequence[float]) -> list[float]:
-    """Three levels: one of each third of the range."""
-    thirds = np.array_split(np.asarray(between), 3)
-    return [float(random.choice(third)) for third in thirds]
+def _levels(trials: int) -> int:
+    """How many levels of calcium between rest and full activation a study of so many trials has."""
+    return 3 + sum(trials >= more for more in _MORE_LEVELS)
+
+
+def _spread_over(random: np.random.Generator, between: Sequence[float], count: int) -> list[float]:
+    """So many levels, or as many as there are: one of each part of the range."""
+    parts = np.array_split(np.asarray(between), min(count, len(between)))
+    return [float(random.choice(part)) for part in parts]
 
 
 def _ms(seconds: float) -> float:

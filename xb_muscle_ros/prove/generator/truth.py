@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.prove.generator.layout import At
-from xb_muscle_ros.prove.generator.world import Acting, Answer, Mesh, Stimulus, World, simulate
+from xb_muscle_ros.prove.generator.world import Acting, Answer, AtRest, Mesh, Stimulus, World, simulate
 
 Array = npt.NDArray[np.float64]
 Act = Callable[[Sequence[Stimulus], int], Acting]
@@ -44,8 +44,10 @@ class Truth:
         return replace(self, adds=(*self.adds, add))
 
 
-def trial_force(truth: Truth, study: Sequence[Stimulus], i: int, mesh: Mesh | None = None) -> Array:
-    """Force of the fibre in trial i, F0, at every sample."""
+def trial_force(
+    truth: Truth, study: Sequence[Stimulus], i: int, mesh: Mesh | None = None, rest: AtRest | None = None
+) -> Array:
+    """Force of the fibre in trial i, F0, at every sample; `rest` as `world.simulate` takes it."""
     stimulus = study[i]
     acting = Acting.plain(stimulus.length.size - 1)
     for act in truth.acts:
@@ -56,10 +58,11 @@ def trial_force(truth: Truth, study: Sequence[Stimulus], i: int, mesh: Mesh | No
             acting.switch_off * more.switch_off,
             acting.recruitment + more.recruitment,
         )
-    answer = simulate(truth.world, stimulus, acting, mesh)
+    answer = simulate(truth.world, stimulus, acting, mesh, rest)
     return answer.force + sum((add(stimulus, answer) for add in truth.adds), np.zeros(stimulus.length.size))
 
 
 def study_forces(truth: Truth, study: Sequence[Stimulus], mesh: Mesh | None = None) -> list[Array]:
     """`trial_force` of every trial."""
-    return [trial_force(truth, study, i, mesh) for i in range(len(study))]
+    rest: AtRest = {}
+    return [trial_force(truth, study, i, mesh, rest) for i in range(len(study))]

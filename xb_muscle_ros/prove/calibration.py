@@ -1,0 +1,87 @@
+"""Whether stated probabilities are as often right as they say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.prove.counting import Score, share
+
+Array = npt.NDArray[np.float64]
+
+BINS = 10
+"""Bins of equal width; a bin has its lower edge, the last its upper edge as well."""
+_RESAMPLES = 2000
+
+
+class Stated(NamedTuple):
+    """A probability, and whether what it is of was there."""
+
+    probability: float
+    right: bool
+
+
+def error(cases: Sequence[Sequence[Stated]]) -> float | None:
+    """Expected calibration error: mean over all statements of |mean probability - share right| of their bins.
+
+    Args:
+        cases: the statements of every case.
+
+    Returns:
+        None where there is no statement.
+    """
+    sums = _sums(cases)
+    return float(_error(sums.sum(axis=0))) if sums[..., 0].any() else None
+
+
+def calibration_score(name: str, meaning: str, cases: Sequence[Sequence[Stated]], bar: float | None = None) -> Score:
+    """Expected calibration error with a bootstrap interval over cases; `n` counts statements."""
+    value = error(cases)
+    if value is None:
+        return Score(name, meaning, None, 0, None, None, bar, True)
+    sums = _sums(cases)
+    random = np.random.default_rng(1)
+    # How often each case is drawn in each resample.
+    drawn = random.multinomial(len(cases), np.full(len(cases), 1.0 / len(cases)), _RESAMPLES).astype(np.float64)
+    resampled = _error(np.tensordot(drawn, sums, axes=1))
+    lower, upper = np.nanpercentile(resampled, [2.5, 97.5])
+    return Score(name, meaning, value, int(sums[..., 0].sum()), float(lower), float(upper), bar, True)
+
+
+def reliability(cases: Sequence[Sequence[Stated]]) -> list[dict[str, Any]]:
+    """Bins that have statements: edges, mean probability, share right with its Clopper–Pearson interval."""
+    statements = [stated for case in cases for stated in case]
+    places = _places(np.array([stated.probability for stated in statements]))
+    rows = []
+    for place in range(BINS):
+        here = [stated for stated, at in zip(statements, places, strict=True) if at == place]
+        if here:
+            mean = float(np.mean([stated.probability for stated in here]))
+            right = share("right", "", (stated.right for stated in here))
+            rows.append({"from": place / BINS, "to": (place + 1) / BINS, "mean_probability": mean, **right._asdict()})
+    return rows
+
+
+def _places(probability: Array) -> npt.NDArray[np.int64]:
+    """Bin of each probability."""
+    # Rounded, because 0.3 * 10 lies below 3 for a computer and 0.7 * 10 need not.
+    places = np.floor(np.round(probability * BINS, 9)).astype(np.int64)
+    return np.asarray(np.minimum(places, BINS - 1))
+
+
+def _sums(cases: Sequence[Sequence[Stated]]) -> Array:
+    """Number, sum of probabilities and number right by case and bin, shape (cases, bins, 3)."""
+    sums = np.zeros((len(cases), BINS, 3))
+    for row, statements in zip(sums, cases, strict=True):
+        values = np.array([(1.0, s.probability, float(s.right)) for s in statements]).reshape(-1, 3)
+        np.add.at(row, _places(values[:, 1]), values)
+    return sums
+
+
+def _error(sums: Array) -> Array:
+    """Of sums over cases, shape (..., bins, 3); NaN where there is no statement."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.abs(sums[..., 1] - sums[..., 2]).sum(axis=-1) / sums[..., 0].sum(axis=-1))
