@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from xb_muscle_ros.diagnose.search import explore
 
@@ -17,7 +17,7 @@ class Effort:
         draws: of the bootstrap.
     """
 
-    search: explore.Effort = explore.Effort()
+    search: explore.Effort = field(default_factory=explore.Effort)
     folds: int = 8
     draws: int = 500
 

@@ -32,8 +32,8 @@ def of_effort(effort: Effort, usual: Effort, trials: int) -> list[str]:
     if effort != usual:
         lines.append(
             f"this is a quick diagnosis: at most {effort.search.steps} names in a set (else {usual.search.steps}), "
-            f"{effort.search.candidates} candidates fitted at each step ({usual.search.candidates}), {effort.folds} groups left "
-            f"out in turn ({usual.folds}), {effort.draws} repeats of the bootstrap ({usual.draws})"
+            f"{effort.search.candidates} candidates fitted at each step ({usual.search.candidates}), {effort.folds} "
+            f"groups left out in turn ({usual.folds}), {effort.draws} repeats of the bootstrap ({usual.draws})"
         )
     if trials < 3:
         lines.append(
@@ -54,14 +54,13 @@ def of_fibre(given: Fibre, trials: Sequence[Trial], recordings: Recordings, syst
         shown: the fit that stands for the answer.
     """
     coordinates = system.problem(shown.names, shown.values).coordinates
-    lines = [
+    return [
         *_inputs(given, trials),
         *_noise(recordings),
         *_closure(system),
         *_bounds(coordinates),
         *_edges(coordinates),
     ]
-    return lines
 
 
 def of_search(unsolved: Sequence[Names], left_out: Sequence[str]) -> list[str]:
@@ -112,7 +111,10 @@ def _noise(recordings: Recordings) -> Iterator[str]:
 def _closure(system: System) -> Iterator[str]:
     if system.closure_f0:
         size = float(np.sqrt(np.mean(np.concatenate([v**2 for v in system.closure_f0.values()]))))
-        yield f"the Gaussian form's own error, {100.0 * size:.2f} % F0, was taken out (by the distribution's force at the base's fit)"
+        yield (
+            f"the Gaussian form's own error, {100.0 * size:.2f} % F0, was taken out (by the distribution's force at "
+            "the base's fit)"
+        )
 
 
 def _bounds(coordinates: Sequence[Coordinate]) -> Iterator[str]:

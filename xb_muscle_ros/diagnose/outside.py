@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.words import percent
 from xb_muscle_ros.errors import UserError
@@ -12,8 +13,10 @@ from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 
+Array = npt.NDArray[np.float64]
+
 # Beyond these a force is absurd, F0: passive, active, and a push.
-_PASSIVE_F0, _ACTIVE_F0, _PUSH_F0 = 0.5, 3.0, -0.02
+_PASSIVE_F0, _ACTIVE_F0, _PUSH_F0 = 0.5, 3.0, -0.05
 # Less than this beyond the base's is not the answer's doing, F0.
 _MORE_F0 = 0.1
 _PASSIVE_PCA = 9.0
@@ -41,7 +44,7 @@ def warnings(fibre: Fibre, base: Fibre, trials: Sequence[FitTrial]) -> list[str]
     return found
 
 
-def _force(fibre: Fibre, trial: FitTrial, length: np.ndarray, calcium: np.ndarray, slower: float) -> np.ndarray | None:
+def _force(fibre: Fibre, trial: FitTrial, length: Array, calcium: Array, slower: float) -> Array | None:
     """Force with times stretched by a factor, F0; None where the model has no solution."""
     try:
         muscle = Muscle(fibre)
@@ -51,7 +54,7 @@ def _force(fibre: Fibre, trial: FitTrial, length: np.ndarray, calcium: np.ndarra
         return None
 
 
-def _judged(name: str, words: str, forces: Sequence[np.ndarray | None], most_f0: float) -> list[str]:
+def _judged(name: str, words: str, forces: Sequence[Array | None], most_f0: float) -> list[str]:
     own, base = forces
     if own is None:
         if base is None:

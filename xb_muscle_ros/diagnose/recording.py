@@ -23,6 +23,7 @@ from xb_muscle_ros.diagnose.result import (
     FORMAT,
     Component,
     Diagnosis,
+    Law,
     NextExperiment,
     Remaining,
     SetOfMechanisms,
@@ -79,7 +80,7 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
     warned = [w for s in study.studies for t in s.trials for w in t.warnings]
     warned += study.lines
     if augmented:
-        for i, name in enumerate(names):
+        for i in range(count):
             base = study.fibre_with((), i)
             with_all = study.fibre_with(chosen, i)
             warned += outside.warnings(with_all, base, study.recorded[i].trials)
@@ -137,7 +138,7 @@ def _described(study: Searched, before: Sequence[Around], after: Sequence[Around
     return True
 
 
-def _law(study: Searched, arounds: Sequence[Around], detected: bool) -> object:
+def _law(study: Searched, arounds: Sequence[Around], detected: bool) -> Law | None:
     """The law of the fibre whose residual follows one best; None where none does."""
     if not detected:
         return None

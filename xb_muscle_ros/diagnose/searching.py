@@ -147,7 +147,8 @@ def _predict(judged: Judged) -> None:
     explorer.fit([(chosen, [[f.values] for f in explorer.fits[nearest]])], "answer")
     if chosen not in explorer.fits:
         raise UserError(
-            f"fibre {explorer.systems[0].fibre.name}: the model has no solution with all that has evidence; give more trials"
+            f"fibre {explorer.systems[0].fibre.name}: the model has no solution with all that has "
+            "evidence; give more trials"
         )
     shorter = [tuple(m for m in chosen if m is not n) for n in chosen]
     explorer.fit([(s, [[f.values] for f in explorer.fits[chosen]]) for s in shorter], "answer but one")

@@ -89,7 +89,7 @@ def traced(study: Searched, chosen: Names, before: Sequence[Around], after: Sequ
                     held[1],
                     without,
                     plain,
-                )  # fmt: skip
+                )
             )
     return found
 

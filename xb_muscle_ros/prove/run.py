@@ -51,7 +51,7 @@ def run(folder: Path, out: Path, quick: bool, seed: int, options: Options, overw
 
 def _stale(out: Path, cases: set[str]) -> list[Path]:
     """Diagnoses in a folder of results that are of cases of another benchmark."""
-    from xb_muscle_ros.diagnose.outcome import older_results
+    from xb_muscle_ros.diagnose.outputs import older_results
 
     try:
         older = {str(name) for name in load_benchmark(out)["cases"]}
@@ -76,6 +76,7 @@ def _task(folder: Path, out: Path, name: str, quick: bool, seed: int) -> dict[st
 
 def _diagnose(task: Mapping[str, Any]) -> dict[str, JsonValue]:
     """Diagnose one case; a case that the tool cannot do is a result as well."""
+    from xb_muscle_ros.diagnose.report.output import as_row
     from xb_muscle_ros.diagnose.run import diagnose_bags
     from xb_muscle_ros.trials.bags import find_bags
 
@@ -92,7 +93,7 @@ def _diagnose(task: Mapping[str, Any]) -> dict[str, JsonValue]:
         )
     except UserError as error:
         return {"error": str(error), "seconds": time.perf_counter() - start}
-    return {**needed(found), "seconds": time.perf_counter() - start}
+    return {**needed(as_row(found)), "seconds": time.perf_counter() - start}
 
 
 def needed(diagnosis: Mapping[str, Any]) -> dict[str, JsonValue]:

@@ -73,7 +73,7 @@ class Judged:
         fitted = [s for s in self.explorer.fits if set(s) <= named and all(len(set(s) & set(g)) == 1 for g in wanted)]
         if fitted:
             return max(fitted, key=self.explorer.evidence)
-        return ordered(g[0] for g in wanted)
+        return ordered([g[0] for g in wanted])
 
 
 def components(judged: Judged) -> tuple[Component, ...]:

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import logsumexp
 
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search.descent import TOLD
@@ -44,7 +43,7 @@ class Averaged:
     @property
     def probability(self) -> Array:
         """Of each set, shape (sets,)."""
-        chances: Array = np.exp(self.log_evidence - logsumexp(self.log_evidence))
+        chances: Array = np.exp(self.log_evidence - np.logaddexp.reduce(self.log_evidence))
         return chances
 
     def including(self, names: Collection[Name]) -> float:
@@ -58,7 +57,7 @@ class Averaged:
         here = np.array([bool(wanted & set(s)) for s in self.sets])
         if not np.any(here) or np.all(here):
             return -math.inf if not np.any(here) else math.inf
-        return float(logsumexp(self.log_evidence[here]) - logsumexp(self.log_evidence[~here]))
+        return float(np.logaddexp.reduce(self.log_evidence[here]) - np.logaddexp.reduce(self.log_evidence[~here]))
 
     def rivals(self, name: Name, others: Sequence[Name]) -> list[Name]:
         """Names that take its place in other sets."""

@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import logsumexp
 
 Array = npt.NDArray[np.float64]
 
@@ -41,14 +40,14 @@ class Estimate(NamedTuple):
     @property
     def information(self) -> float:
         """Of the data alone."""
-        return max(self.sd**-2.0 - self.prior_sd**-2.0, 0.0)
+        return max(float(self.sd**-2.0 - self.prior_sd**-2.0), 0.0)
 
     @property
     def likeliest(self) -> float:
         """Where the data alone would have it; the prior's mean where they know nothing."""
         if self.information <= 0.0:
             return self.prior_mean
-        return (self.value * self.sd**-2.0 - self.prior_mean * self.prior_sd**-2.0) / self.information
+        return float(self.value * self.sd**-2.0 - self.prior_mean * self.prior_sd**-2.0) / self.information
 
 
 class Distribution(NamedTuple):
@@ -68,7 +67,7 @@ def adjustment(estimates: Sequence[Estimate]) -> float:
     """By how much the evidence of fits grows; estimates of one coordinate, one for each fibre."""
     alone = sum(_marginal([e], e.prior_sd, 0.0) for e in estimates)
     together = [_marginal(estimates, sd, spread) for sd, spread in _widths(estimates)]
-    return float(logsumexp(together) - math.log(len(together)) - alone)
+    return float(np.logaddexp.reduce(together) - math.log(len(together)) - alone)
 
 
 def _widths(estimates: Sequence[Estimate]) -> list[tuple[float, float]]:
@@ -80,7 +79,7 @@ def _widths(estimates: Sequence[Estimate]) -> list[tuple[float, float]]:
 
 
 def _marginal(estimates: Sequence[Estimate], sd: float, spread: float) -> float:
-    """Logarithm of the marginal likelihood of some fibres whose centre has the prior, but for a constant of the data."""
+    """Logarithm of the marginal likelihood of fibres whose centre has the prior, but for a constant of the data."""
     total, centre, mean = sd**-2.0, 0.0, estimates[0].prior_mean
     found = -math.log(sd)
     for e in estimates:
@@ -91,7 +90,7 @@ def _marginal(estimates: Sequence[Estimate], sd: float, spread: float) -> float:
         found += -0.5 * math.log(variance * e.information) - 0.5 * away**2 / variance
         total += 1.0 / variance
         centre += away / variance
-    return found - 0.5 * math.log(total) + 0.5 * centre**2 / total
+    return float(found - 0.5 * math.log(total) + 0.5 * centre**2 / total)
 
 
 def distribution(estimates: Sequence[Estimate]) -> Distribution:
@@ -105,7 +104,7 @@ def distribution(estimates: Sequence[Estimate]) -> Distribution:
         centres.append(mean + sum(w * (e.likeliest - mean) for w, e in zip(weights, estimates, strict=True)) / total)
         variances.append(1.0 / total)
         spreads.append(spread)
-    chances = np.exp(np.array(logs) - logsumexp(logs))
+    chances = np.exp(np.array(logs) - np.logaddexp.reduce(logs))
     centre = float(chances @ centres)
     variance = float(chances @ (np.array(variances) + (np.array(centres) - centre) ** 2))
     return Distribution(centre, math.sqrt(variance), float(chances @ np.array(spreads)))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.inference.population import Estimate, adjustment
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
@@ -17,6 +18,8 @@ from xb_muscle_ros.diagnose.search.whole import beside
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.work import Options, run
+
+Array = npt.NDArray[np.float64]
 
 # Chance, before anything is seen, that a mechanism is part of the truth, or an artefact beyond the ordinary.
 _PRIOR_ODDS = {True: np.log(0.1), False: np.log(0.05)}
@@ -59,7 +62,7 @@ def fitted(
     system: System, names: Collection[Name], starts: Sequence[Mapping[str, float]], most: int, tolerance: float
 ) -> Fit | None:
     """Fit a set from the best of several starts; None where the model has no solution at any."""
-    begun = []
+    begun: list[tuple[float, Descent, Array, Array | None]] = []
     for start in starts:
         try:
             problem = system.problem(names, start)
@@ -67,11 +70,11 @@ def fitted(
             if len(starts) == 1:
                 begun.append((0.0, descent, problem.start, None))
                 continue
-            point, slopes = descent.walk(problem.start, 2, tolerance)
-            begun.append((descent.cost(point), descent, point.z, slopes))
+            point, near = descent.walk(problem.start, 2, tolerance)
+            begun.append((descent.cost(point), descent, point.z, near))
         except (UserError, np.linalg.LinAlgError):
             continue
-    for _, descent, z, slopes in sorted(begun, key=lambda b: b[0]):
+    for _, descent, z, _near in sorted(begun, key=lambda b: b[0]):
         try:
             point, slopes = descent.walk(z, most, tolerance)
             return descent.fit(ordered(names), point, slopes)
@@ -116,8 +119,8 @@ class Explorer:
         rows = run(fit_task, tasks, replace(self.options, label=why)) if tasks else []
         count = len(self.systems)
         for i, (names, _) in enumerate(missing):
-            own = rows[i * count : (i + 1) * count]
-            if any(row is None for row in own):
+            own = [row for row in rows[i * count : (i + 1) * count] if row is not None]
+            if len(own) < count:
                 self.unsolved.append(names)
             else:
                 self.fits[names] = tuple(Fit.from_json(row) for row in own)
@@ -148,11 +151,10 @@ class Explorer:
         found: dict[str, list[Estimate]] = {label: [] for label in labels}
         for system, fit in zip(self.systems, fits, strict=True):
             coordinates = {c.label: c for c in system.problem(names, fit.values).coordinates}
-            for label in labels:
-                c = coordinates[label]
-                found[label].append(
-                    Estimate(c.inward(fit.values[label]), fit.sds[label], c.prior_mean, c.prior_sd, label in effects)
-                )
+            for key in labels:
+                c = coordinates[key]
+                value, sd = c.inward(fit.values[key]), fit.sds[key]
+                found[key].append(Estimate(value, sd, c.prior_mean, c.prior_sd, key in effects))
         return found
 
     def adjusted(self, names: Names, fibre: int | None = None) -> float:

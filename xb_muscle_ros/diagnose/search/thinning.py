@@ -22,7 +22,7 @@ _SHORTEST_S, _GROWTH = 0.001, 0.12
 # What may be straightened, L0 and relative: 0.1 % F0 of a stiff fibre.
 _LENGTH_L0, _CALCIUM = 2e-5, 1e-3
 MEMORY_S, _SLOWING = 0.03, 0.5
-"""Residuals so far apart are as good as independent right after a corner; later by this share of the time since more."""
+"""Residuals so far apart are as good as independent right after a corner; later by a share of the time since more."""
 
 
 class Thinned(NamedTuple):
