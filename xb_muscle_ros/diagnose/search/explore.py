@@ -200,7 +200,9 @@ class Explorer:
                 found[name] = [promise(one, name) for one in linear]
             except (UserError, np.linalg.LinAlgError):
                 continue
-            self.promised[ordered((*names, name))] = tuple(p.mean_square_f0 for p in found[name])
+            # What only a fit can tell promises nothing that could be averaged over.
+            if not any(np.isnan(p.mean_square_f0) for p in found[name]):
+                self.promised[ordered((*names, name))] = tuple(p.mean_square_f0 for p in found[name])
         return found
 
     def step(self, names: Names, count: int, blind: bool) -> list[Names]:
