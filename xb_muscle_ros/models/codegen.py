@@ -11,6 +11,7 @@ import sympy
 from xb_muscle_ros.mechanisms.base import Parameter
 from xb_muscle_ros.models.composition import INPUTS, OUTPUTS, Equations, Model
 from xb_muscle_ros.models.elimination import Elimination
+from xb_muscle_ros.models.factoring import replaced
 from xb_muscle_ros.models.program import Program, c, jacobian, program, python
 from xb_muscle_ros.stepping import ros3
 
@@ -195,7 +196,7 @@ def _attempt(e: Equations, body: Program) -> str:
     lines += [f"e_{i} = {_sum([], ros3.E, i)}" for i in range(n)]
     lines += [f"y_{i} = {_sum([starts[i]], ros3.M, i)}" for i in range(n)]
     swap = {symbol: sympy.Symbol(f"y_{i}", real=True) for i, symbol in enumerate(variables)}
-    arrival = program([x.subs(swap, simultaneous=True) for x in e.arrival], "m")
+    arrival = program([replaced(x, swap) for x in e.arrival], "m")
     lines += assignments(arrival)
     lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(arrival.results)]
     # Relative for large moments, absolute otherwise: forces and fractions are of order one.
@@ -229,8 +230,8 @@ def moving_rates(e: Equations) -> list[Any]:
     rates = e.derivatives[:-1]
     moving = []
     for x in e.arrival:
-        total = sum(sympy.diff(x, v) * r for v, r in zip(variables, rates, strict=True))
-        moving.append(sympy.sympify(total).subs(e.shift, 0))
+        total = sum(sympy.diff(x, v) * r for v, r in zip(variables, rates, strict=True) if v in x.free_symbols)
+        moving.append(replaced(sympy.sympify(total), {e.shift: sympy.Integer(0)}))
     return moving
 
 
