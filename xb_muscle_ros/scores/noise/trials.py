@@ -154,7 +154,7 @@ def _like_others(
     level = np.log([levels_f0[other] for other in known])
     away = math.log(levels_f0[name]) - float(np.mean(level))
     power, power_sd, spread = _power_of_force(log, level)
-    mean = float(np.mean(log)) + power * away
+    mean = max(float(np.mean(log)) + power * away, math.log(LEAST_SD_F0))
     spread = math.hypot(spread, power_sd * away)
     same = [noise for noise in known.values() if alike(steps_s[noise.trial], steps_s[name])] or list(known.values())
     like = min(same, key=lambda noise: abs(math.log(noise.sd_f0) - mean))
@@ -164,7 +164,7 @@ def _like_others(
         trial=name,
         source=Source.OTHERS,
         samples=0,
-        sd_f0=math.exp(mean),
+        sd_f0=max(math.exp(mean), LEAST_SD_F0),
         freedom=like.freedom,
         likeliest=like.likeliest.times(factor),
         members=tuple(like.members[k % len(like.members)].times(float(sizes[k])) for k in range(MEMBERS)),
