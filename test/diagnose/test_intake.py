@@ -15,6 +15,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import find_fibre_file
 from xb_muscle_ros.scores.noise.model import Source
 from xb_muscle_ros.scores.noise.trials import noise_of
+from xb_muscle_ros.scores.standard_error import force_noise
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.completing import Known
 from xb_muscle_ros.trials.importing import Imported, import_recordings
@@ -199,3 +200,5 @@ def test_coarse_recordings_without_phases_are_read_and_said(shared_data: Path, r
     noise = noise_of(bare.trials)
     assert all(5e-5 < each.sd_f0 < 1e-2 for each in noise.trials)
     assert {each.source for each in noise.trials} == {Source.CURVE}
+    # So that their isometric forces have standard errors.
+    assert all(force_noise(trial) is not None for trial in bare.trials)

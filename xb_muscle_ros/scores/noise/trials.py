@@ -67,12 +67,12 @@ def noise_of(trials: Sequence[Trial]) -> NoiseModel:
             f"{LEAST_DIFFERENCES} in one trial are needed"
         )
     by_name = {t.facts.trial: t for t in trials}
-    known = {name: _at_least(noise, _scatter_f0(by_name[name])) for name, noise in known.items()}
+    known = {name: _at_least(noise, steady_scatter_f0(by_name[name])) for name, noise in known.items()}
     steps_s = {t.facts.trial: _step_s(t.force_time_s) if even[t.facts.trial] else math.nan for t in trials}
     return completed(known, steps_s, {t.facts.trial: _level_f0(t) for t in trials})
 
 
-def _scatter_f0(trial: Trial) -> float:
+def steady_scatter_f0(trial: Trial) -> float:
     """Standard deviation of steady force around a straight line, F0; 0 where too little of it is steady."""
     inside, _ = steady_part(trial, trial.force_time_s, trial.measured_f0)
     force = trial.measured_f0[inside]
