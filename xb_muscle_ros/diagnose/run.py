@@ -62,7 +62,9 @@ def diagnose_bags(
     return found
 
 
-def diagnose(studies: Sequence[FibreStudy], effort: Effort, seed: int, options: Options) -> tuple[Diagnosis, Files]:
+def diagnose(
+    studies: Sequence[FibreStudy], effort: Effort, seed: int, options: Options, table: FeatureTable | None = None
+) -> tuple[Diagnosis, Files]:
     """Diagnose a study of one fibre or of several.
 
     Returns:
