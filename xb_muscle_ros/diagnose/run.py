@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from xb_muscle_ros.diagnose.effort import QUICK, Effort
+from xb_muscle_ros.diagnose.feature_tables import FeatureTable, read_features
+from xb_muscle_ros.diagnose.featuring import with_features
 from xb_muscle_ros.diagnose.intake import FibreStudy, read_fibres
 from xb_muscle_ros.diagnose.outputs import Files, write
 from xb_muscle_ros.diagnose.recording import recorded
@@ -29,6 +31,7 @@ def diagnose_bags(
     report: bool = True,
     known: Known | None = None,
     only: str | None = None,
+    predict: Path | None = None,
 ) -> Diagnosis:
     """Diagnose the trials of some bags and write what was found.
 
@@ -44,20 +47,24 @@ def diagnose_bags(
         report: write the page as well.
         known: what is known of L0 and F0 beside bags and fibre files.
         only: with one fibre: take trials of this fibre and no other.
+        predict: table of measured SRS and isometric force to be predicted, never fitted.
 
     Raises:
         UserError: bags that cannot be read or do not belong together, no force, no solution at the start.
     """
     files = [fibers] if isinstance(fibers, (str, Path)) else list(fibers)
     studies = read_fibres(bags, files, model, method, known, only)
+    table = None if predict is None else read_features(predict, {s.fibre.name: s.trials for s in studies})
     options = options or Options(processes=0, quiet=True)
     options = replace(options, journal=options.journal or out / "journal.jsonl")
-    found, made = diagnose(studies, QUICK if quick else Effort(), seed, options)
+    found, made = diagnose(studies, QUICK if quick else Effort(), seed, options, table)
     write(out, found, made, report)
     return found
 
 
-def diagnose(studies: Sequence[FibreStudy], effort: Effort, seed: int, options: Options) -> tuple[Diagnosis, Files]:
+def diagnose(
+    studies: Sequence[FibreStudy], effort: Effort, seed: int, options: Options, table: FeatureTable | None = None
+) -> tuple[Diagnosis, Files]:
     """Diagnose a study of one fibre or of several.
 
     Returns:
@@ -69,4 +76,6 @@ def diagnose(studies: Sequence[FibreStudy], effort: Effort, seed: int, options: 
     begun = time.monotonic()
     study = searched(studies, effort, seed, options)
     found, made = recorded(study, effort, seed)
+    if table is not None:
+        found = with_features(found, study, table)
     return replace(found, seconds=time.monotonic() - begun), made

@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 
 # A mechanism's line is followed this far either way, in units of its start, where the fit begins.
 _LEAST_SHARE, _MOST_SHARE = 0.1, 8.0
-BLIND = (*FRAMES, Name.THICK_FILAMENT_COOPERATIVITY)
+BLIND = tuple(n for n in (*FRAMES, Name.THICK_FILAMENT_COOPERATIVITY) if n is not Name.HALF_SARCOMERE_SPREAD)
 """Mechanisms that only a fit can tell: no line leads from their absence to them."""
 
 
