@@ -26,6 +26,7 @@ from recorded_trials import chosen
 
 from xb_muscle_ros.cli.common import add_work, work_options_of
 from xb_muscle_ros.diagnose.effort import QUICK, Effort
+from xb_muscle_ros.diagnose.feature_tables import read_features
 from xb_muscle_ros.diagnose.intake import FibreStudy
 from xb_muscle_ros.diagnose.outputs import write
 from xb_muscle_ros.diagnose.report import output
@@ -55,6 +56,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", nargs="*", type=_case, metavar="CASE", help=f"of {', '.join(CASES)}; default: all")
     parser.add_argument("--recordings", type=Path, nargs="+", default=[Path("../shared/data/recordings")])
+    parser.add_argument("--features", type=Path, default=Path("../shared/data/empirical_srs.json"), help="table of SRS")
     parser.add_argument("--out", type=Path, default=Path("out/recordings"))
     parser.add_argument("--images", type=Path, default=Path("docs/images"))
     parser.add_argument("--page", type=Path, default=Path("docs/recordings.md"))
@@ -67,7 +69,11 @@ def main() -> int:
     for case in [] if given.page_only else given.only or CASES.values():
         folder = given.out / case.key
         try:
-            run_case(case, given.recordings, folder, given.quick, given.again, work_options_of(given))
+            if given.again:
+                forget(folder)
+            if not (folder / "predictions.json").exists():
+                table = given.features if case.features else None
+                run_case(case, given.recordings, table, folder, given.quick, work_options_of(given))
         except UserError as error:
             print(f"{case.key}: {error}", file=sys.stderr)
             failed += 1
@@ -92,24 +98,27 @@ def _text(path: Path) -> str:
     return path.read_text(encoding="utf-8") if path.is_file() else ""
 
 
-def run_case(case: Case, recordings: Sequence[Path], folder: Path, quick: bool, again: bool, options: Options) -> None:
+def forget(folder: Path) -> None:
+    """Remove what a case found, and its journal; its bags stay."""
+    for name in (output.JSON, "predictions.json", "journal.jsonl"):
+        (folder / name).unlink(missing_ok=True)
+
+
+def run_case(
+    case: Case, recordings: Sequence[Path], features: Path | None, folder: Path, quick: bool, options: Options
+) -> None:
     """Import, diagnose and predict, as far as that is not done.
 
     Raises:
         UserError: recordings are absent or cannot be read, or none of them are those of the case.
     """
-    if again:
-        for name in (output.JSON, "predictions.json", "journal.jsonl"):
-            (folder / name).unlink(missing_ok=True)
-    if (folder / "predictions.json").exists():
-        return
     trials = imported(case, recordings, folder / "bags")
     shown, concealed = chosen(trials, case.shown), {n: chosen(trials, p) for n, p in case.concealed.items()}
     absent = [p for p in (*case.shown, *sum(case.concealed.values(), ())) if not chosen(trials, [p])]
     if absent:
         raise UserError(f"no recording of {', '.join(absent)}; name all folders of recordings with --recordings")
     if not (folder / output.JSON).exists():
-        diagnose_shown(case, shown, folder, quick, replace(options, journal=folder / "journal.jsonl"))
+        diagnose_shown(case, shown, features, folder, quick, replace(options, journal=folder / "journal.jsonl"))
     d = output.read(folder)
     bases = [base_fibre(load_fibre(folder / _file("start", name, d)), d) for name in d.fibres]
     for base in bases:
@@ -126,7 +135,9 @@ def _file(kind: str, fibre: str, d: Diagnosis) -> str:
     return f"{kind}_{fibre}.yaml" if len(d.fibres) > 1 else f"{kind}.yaml"
 
 
-def diagnose_shown(case: Case, shown: Sequence[Trial], folder: Path, quick: bool, options: Options) -> None:
+def diagnose_shown(
+    case: Case, shown: Sequence[Trial], features: Path | None, folder: Path, quick: bool, options: Options
+) -> None:
     """Diagnose the trials that are shown, each fibre from its own start, and write what was found."""
     names = list(dict.fromkeys(t.facts.fibre for t in shown))
     studies = []
@@ -143,7 +154,8 @@ def diagnose_shown(case: Case, shown: Sequence[Trial], folder: Path, quick: bool
             ["Where the base of the diagnosis beside it started."],
         )
         studies.append(FibreStudy(start, own, ()))
-    found, made = diagnose(studies, QUICK if quick else Effort(), 1, options)
+    table = None if features is None else read_features(features, {s.fibre.name: s.trials for s in studies})
+    found, made = diagnose(studies, QUICK if quick else Effort(), 1, options, table)
     write(folder, found, made)
 
 

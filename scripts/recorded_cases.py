@@ -50,6 +50,7 @@ class Case:
         prefit: whether its parameters are fitted from several starts first.
         prepare: what is done to a trial before anything else.
         pooled: key of the study of many fibres of which this is one by itself; empty for others.
+        features: whether a table has SRS and isometric force of its fibres, which are predicted as well.
     """
 
     key: str
@@ -62,6 +63,7 @@ class Case:
     prefit: bool = True
     prepare: Callable[[Trial], Trial] = field(default=lambda trial: trial)
     pooled: str = ""
+    features: bool = False
 
 
 def released(model: str) -> Callable[[Sequence[Trial]], Fibre]:
@@ -126,7 +128,7 @@ start is the released set of each fibre. Whole solutions are left out in turn wi
 errors are those of a pCa that the fit did not see."""
     title = f"Five rat soleus fibres, base `{model}`"
     imports = (*_of_fibres(*FIBRES), *_KILOHERTZ)
-    return Case(f"fibres_{model}", title, about, imports, _SIX_MS, _UNSEEN, released(model), False)
+    return Case(f"fibres_{model}", title, about, imports, _SIX_MS, _UNSEEN, released(model), False, features=True)
 
 
 def _single(name: str, model: str) -> Case:
@@ -144,6 +146,7 @@ def _single(name: str, model: str) -> Case:
         released(model),
         False,
         pooled=f"fibres_{model}",
+        features=True,
     )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from recorded_cases import Case
 from recorded_predictions import END_S
-from recorded_tables import components, concealed, fibres, force, places, probability, sets, table
+from recorded_tables import components, concealed, feature_scores, fibres, force, places, probability, sets, table
 
 from xb_muscle_ros.diagnose.report import output, prose
 from xb_muscle_ros.diagnose.result import Diagnosis, Kind
@@ -114,6 +114,10 @@ def section(case: Case, d: Diagnosis, rows: Sequence[dict[str, Any]], images: st
         "What the answer leaves:\n\n" + places(d.remaining.where) if d.named else "",
         "Most probable sets:\n\n" + sets(d),
         _concealed(d, rows),
+        "RMSD of relative SRS at conditions that no trace has (`empirical_srs.json`, readings of "
+        "[evaluate.md](evaluate.md)):\n\n" + feature_scores(d)
+        if d.feature_scores
+        else "",
         _lines("Warnings, given before anything concealed was looked at", d.warnings),
         _lines("Missing", d.missing),
         _lines("Notes", d.notes),

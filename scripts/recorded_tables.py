@@ -84,6 +84,12 @@ def places(found: Sequence[Place]) -> str:
     return table(["trial", "phase", "time (s)", "size", "mean, measured less model"], rows)
 
 
+def feature_scores(d: Diagnosis) -> str:
+    """Relative SRS at conditions that no trace has."""
+    rows = [[f.reading, f.conditions, str(f.count), f"{f.before:.3f}", f"{f.after:.3f}"] for f in d.feature_scores]
+    return table(["reading", "reductions", "conditions", "base", "answer"], rows)
+
+
 def sets(d: Diagnosis) -> str:
     """The most probable sets, and the base."""
     rows = list(d.sets[:_SETS])
