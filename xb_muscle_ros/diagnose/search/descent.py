@@ -228,7 +228,11 @@ class Descent:
         known = self.information > 0.0
         widths = self.information[known] ** -0.5
         _, twice = np.linalg.slogdet(curvature[np.ix_(known, known)] * widths * widths[:, None])
-        sds = np.sqrt(np.maximum(np.diag(np.linalg.pinv(curvature)), 0.0))
+        # Where rounding hides what the data tell of a coordinate, they tell nothing.
+        variances = np.diag(np.linalg.pinv(curvature))
+        priors = np.where(known, np.maximum(self.information, 1e-300) ** -0.5, np.inf)
+        sds = np.where(variances > 0.0, np.sqrt(np.maximum(variances, 0.0)), priors)
+        sds = np.minimum(sds, priors)
         by_label = {c.label: float(sd) for c, sd in zip(self.problem.coordinates, sds, strict=True)}
         return Fit(
             ordered(names), values, point.mean_square, prior, 0.5 * float(twice), by_label, round(self.simulated)
