@@ -77,7 +77,7 @@ def predicted(system: System, fit: Fit, trial: FitTrial, closure_f0: Array | Non
     size = len(problem.coordinates)
     correction = None
     if closure_f0 is not None:
-        correction = Correction(np.zeros(size), {trial.name: closure_f0}, {}, np.empty(0), np.empty((0, size)))
+        correction = Correction.level(np.zeros(size), {trial.name: closure_f0}, np.zeros(len(problem.features)))
     problem = replace(problem, correction=correction)
     return calibrated_force(problem, problem.start, trial).force_f0
 
