@@ -13,8 +13,8 @@ import math
 OFFSET, SLOPE, SIZE = 0.0, 0.6, 1.5
 PRACTICAL_F0 = 0.003
 """A contribution below it is of no use to anyone, F0."""
-# Contributions are counted within these factors of it.
-_LEAST, _LARGEST = 0.1, 10.0
+# Contributions are counted within these factors of it: a large one is no evidence of its own.
+_LEAST, _LARGEST = 0.1, 1.0
 # Beyond this nothing was ever seen to be surer.
 _MOST = 7.0
 
