@@ -141,10 +141,13 @@ def made(fibres: tuple[str, ...], effects: tuple[Effect, ...], unknown_f0: float
             measured = force + total + rest + NOISE_F0 * noise / rms(noise)
             before, after = force + 0.3 * total, force + 0.94 * total
             level = 0.02 * (1.0 + random.normal(0.0, 0.5)) * force
+            fits = (before, after) if effects else (before, before)
+            unseen = (
+                (before + 0.5 * level - 0.1 * total, after + 0.25 * level) if effects else (before + 0.5 * level,) * 2
+            )
             out.append(
                 TrialTraces(
-                    fibre, f"{fibre}_pca{10 * pca:.0f}", time_s, length, measured, 0.93 * force, before, after,
-                    before + 0.5 * level - 0.1 * total, after + 0.25 * level,
+                    fibre, f"{fibre}_pca{10 * pca:.0f}", time_s, length, measured, 0.93 * force, *fits, *unseen,
                     {e.name: after - 0.94 * scale * added[e.name] for e in effects},
                 )
             )  # fmt: skip
@@ -215,7 +218,8 @@ def components(
         share = min(1.0, 0.45 * rms(adds) ** 2 / mismatch)
         out.append(
             Component(
-                e.name, e.kind, e.family, e.members, e.probability, share, gain_of(traces, e.name), (e.parameter,),
+                e.name, e.kind, e.family, e.members, e.probability, share, gain_of(traces, e.name),
+                (e.parameter if len(fibres) > 1 else replace(e.parameter, spread=None),),
                 e.direction, ("weakly_bound_heads",) if e.name == "viscous_drag" else (), tuple(rows),
             )
         )  # fmt: skip
@@ -265,6 +269,8 @@ def sample(
         )
         for of in ("before", "after")
     )
+    left = Law(fibres[0], 0.087, "force", 0.11, 0.38, tuple(np.geomspace(0.002, 5.0, 11).tolist()),
+               (0.0, 0.0, 0.001, 0.0, 0.004, 0.003, 0.0, 0.0, 0.0, 0.001, 0.0), {"constant": 0.2})  # fmt: skip
     law = Law(
         fibres[0], 0.0118, "activation", 0.42, 0.63, tuple(np.geomspace(0.002, 5.0, 11).tolist()),
         (0.0, 0.002, 0.011, 0.006, 0.0, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0),
@@ -288,7 +294,8 @@ def sample(
     d = Diagnosis(
         FORMAT, fibres, "3state_coop", "gaussian", False, 1, 81.2, verdict, mechanisms, parts, explained,
         places(traces, rows, "before_f0"), 0.002, True,
-        Remaining(after.train_rmsd_f0, NOISE_F0, places(traces, rows, "after_f0"), law), law, before, after,
+        Remaining(after.train_rmsd_f0, NOISE_F0, places(traces, rows, "after_f0"), left if effects else law),
+        law, before, after,
         gain_of(traces, ""), 0.7 * (after.heldout_rmsd_f0 or 0.0), tuple(sets),
         study_rows(traces, effects, fibres), rows, tuple(nuisances),
         features=(

@@ -32,6 +32,8 @@ BASE_DOT: dict[str, Any] = {
 }  # fmt: skip
 ANSWER_DOT: dict[str, Any] = {"marker": "o", "color": MODEL, "linestyle": "none", "label": "answer"}
 _BINS = 450
+LINES: tuple[dict[str, Any], ...] = (BASE_LINE, ANSWER_LINE)
+DOTS: tuple[dict[str, Any], ...] = (BASE_DOT, ANSWER_DOT)
 _NAME = 26
 _CLIP = re.compile(r"\bp[0-9a-f]{10}\b")
 

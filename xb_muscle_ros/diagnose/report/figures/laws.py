@@ -22,7 +22,7 @@ def draw_laws(d: Diagnosis) -> Figure | None:
             (d.base_law, "base model", SECOND, "o"),
             (d.remaining.law, "answer", MODEL, "s"),
         )
-        if law is not None
+        if law is not None and (name == "base model" or law != d.base_law)
     ]
     if not laws:
         return None
