@@ -28,6 +28,7 @@ from xb_muscle_ros.diagnose.report.figures.common import (
 from xb_muscle_ros.diagnose.report.phrases import changed, force
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
+from xb_muscle_ros.diagnose.words import joined
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
 _TRIALS, _ROWS = 3, 24
@@ -87,21 +88,24 @@ def _caption(d: Diagnosis, chosen: Sequence[OfTrial], many: bool) -> str:
     unseen = held_out(d)
     what = "predicted by fits that did not see their condition" if unseen else "fitted; nothing was held out"
     which = ["largest", "median", "smallest"] if len(chosen) > 2 else ["largest", "smallest"][: len(chosen)]
-    models = "both models (base dashed, answer solid)" if changed(d) else "the base model (dashed), the answer as well"
+    models = "both models (base dashed, answer solid)"
+    if not changed(d):
+        models = "the base model (dashed), to which the answer adds nothing"
     top = (
-        f"Top: measured force (grey) and {models}, {what}, in trials with the {', '.join(which)} "
+        f"Top: measured force (grey) and {models}, {what}, in trials with the {joined(which)} "
         f"{'fall of the error' if changed(d) else 'error'}; below, measured less model. "
         if chosen
         else ""
     )
+    dotted = " Dotted: non-parametric discrepancy benchmark." if _benchmark(d) else ""
     if many:
+        marks = "; marks are fibres" if len(d.fibres) > 1 else ""
         return (
-            f"{top}Bottom: force RMSD of every trial, base against answer; marks are fibres. Below the line the "
-            f"answer {'predicts' if unseen else 'fits'} better."
+            f"{top}Bottom: force RMSD of every trial, base against answer{marks}. Below the dashed line the answer "
+            f"{'predicts' if unseen else 'fits'} better.{dotted}"
         )
-    return f"{top}Bottom: force RMSD of every trial, base (open) and answer (filled); bars are the trial's noise." + (
-        " Dotted: non-parametric discrepancy benchmark." if _benchmark(d) else ""
-    )
+    both = "base (open) and answer (filled)" if changed(d) else "base"
+    return f"{top}Bottom: force RMSD of every trial, {both}; bars are the trial's noise.{dotted}"
 
 
 def _benchmark(d: Diagnosis) -> list[float]:

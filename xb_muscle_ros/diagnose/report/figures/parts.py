@@ -79,11 +79,13 @@ def _caption(d: Diagnosis, shown: Sequence[Component], parts: int, trials: int) 
     both = say.changed(d)
     which = "the answer takes most off the error" if both else "the error is largest"
     models = (
-        "base model (dashed) and answer (solid)" if both else "and base model (dashed), which is the answer as well"
+        ", base model (dashed) and answer (solid)"
+        if both
+        else " and base model (dashed), to which the answer adds nothing"
     )
     return (
         f"Trials{several} in which {which}, fitted to all trials. Top: length change; below, measured force (grey)"
-        f"{', ' if both else ' '}{models}.{adds} Bottom: measured less model."
+        f"{models}.{adds if both else ''} Bottom: measured less model."
         f"{shown_of(len(shown), parts, 'components', 'the most probable')}"
         f"{shown_of(trials, len(d.trials), 'trials', 'of different solutions where there are any')}"
     )

@@ -13,7 +13,7 @@ from xb_muscle_ros.diagnose.result import NAMED, SURE, Component, Diagnosis, Hel
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
 _MOST, _ROW_MM = 14, 6.4
-_PERCENT = (-200, -100, -50, -20, -10, -5, 0, 5, 10, 20, 30, 40, 50, 60, 70, 80, 90)
+_PERCENT = (-200, -100, -50, -20, -10, -5, -2, -1, 0, 1, 2, 5, 10, 20, 30, 40, 50, 60, 70, 80, 90)
 
 
 def draw_probabilities(d: Diagnosis) -> Figure | None:
