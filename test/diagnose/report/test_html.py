@@ -155,6 +155,19 @@ def test_numbers_of_the_record_stand_on_the_page() -> None:
         assert told in words, told
 
 
+def test_where_the_answer_is_the_base_nothing_is_told_twice() -> None:
+    text = plain(walked(page("unexplained")).text)
+    assert " → " not in text
+    assert "Nothing is added, so the places are those above." in text
+    assert " → " in walked(page("one_fibre")).text
+
+
+def test_ordinary_errors_are_in_two_digits_and_short_times_in_ms() -> None:
+    text = plain(walked(page("one_fibre")).text)
+    assert "time shift whole study 0.41 ± 0.12 ms ± 0.70 ms" in text
+    assert "pCa shift pCa 6.1 −0.030 ± 0.012 ± 0.050" in text
+
+
 def test_long_tables_say_what_they_leave_out() -> None:
     words = plain(walked(without_figures(many(40, 5, 4, 31).diagnosis)).text)
     assert "40 of 200 shown; all are in diagnosis.json." in words

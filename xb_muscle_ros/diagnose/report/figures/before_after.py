@@ -104,7 +104,7 @@ def _caption(d: Diagnosis, chosen: Sequence[OfTrial], many: bool) -> str:
             f"{top}Bottom: force RMSD of every trial, base against answer{marks}. Below the dashed line the answer "
             f"{'predicts' if unseen else 'fits'} better.{dotted}"
         )
-    both = "base (open) and answer (filled)" if changed(d) else "base"
+    both = "base (open) and answer (filled)" if changed(d) else "base model"
     return f"{top}Bottom: force RMSD of every trial, {both}; bars are the trial's noise.{dotted}"
 
 

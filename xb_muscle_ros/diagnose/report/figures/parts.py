@@ -78,11 +78,9 @@ def _caption(d: Diagnosis, shown: Sequence[Component], parts: int, trials: int) 
     several = " of any fibre" if len(d.fibres) > 1 else ""
     both = say.changed(d)
     which = "the answer takes most off the error" if both else "the error is largest"
-    models = (
-        ", base model (dashed) and answer (solid)"
-        if both
-        else " and base model (dashed), to which the answer adds nothing"
-    )
+    models = ", base model (dashed) and answer (solid)"
+    if not both:
+        models = " and base model (dashed), to which the answer adds nothing"
     return (
         f"Trials{several} in which {which}, fitted to all trials. Top: length change; below, measured force (grey)"
         f"{models}.{adds if both else ''} Bottom: measured less model."
