@@ -23,7 +23,7 @@ from xb_muscle_ros.diagnose.report.figures.common import (
 )
 from xb_muscle_ros.diagnose.report.phrases import ONE_WAY, changed
 from xb_muscle_ros.diagnose.result import Diagnosis
-from xb_muscle_ros.diagnose.words import digits, phase_words
+from xb_muscle_ros.diagnose.words import phase_words
 from xb_muscle_ros.figures.style import figure
 
 _TRIALS, _PHASES = 36, 8
@@ -141,7 +141,9 @@ def _draw(axis: Any, of: Cells, trials: Sequence[Key], phases: Sequence[str], li
 def _signed(rms: float, mean: float) -> str:
     one_way = math.isfinite(mean) and abs(mean) >= ONE_WAY * rms
     sign = ("+" if mean > 0.0 else "−") if one_way else "±"
-    return sign + digits(100.0 * rms)
+    percent = 100.0 * rms
+    # As many characters in every cell.
+    return sign + (f"{percent:.2f}" if percent < 0.995 else f"{percent:.1f}" if percent < 9.95 else f"{percent:.0f}")
 
 
 @cache
