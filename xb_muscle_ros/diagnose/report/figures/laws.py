@@ -56,7 +56,8 @@ def _caption(laws: list[tuple[Law, str]]) -> str:
     )
     return (
         "Left: weights of memories of stretch that describe the residual. Right: share of the residual's mean square "
-        f"in trials left out that they describe, by what they scale with; filled is the law. {told}."
+        "in trials left out that they describe, by what they scale with; filled is the law. "
+        + (f"{told[0].upper()}{told[1:]}." if told else "")
     )
 
 

@@ -106,10 +106,7 @@ def _gain_axis(axis: Any) -> None:
     quiet_rows(axis)
     ends = axis.get_xlim()
     top = axis.secondary_xaxis("top")
-    # Round percentages, as many as have room.
-    marks = [
-        p for p in (-50, -20, 0, 10, 20, 30, 40, 50, 60, 70, 80, 90) if ends[0] <= -math.log1p(-p / 100) <= ends[1]
-    ]
+    marks = [p for p in _PERCENT if ends[0] <= -math.log1p(-p / 100) <= ends[1]]
     places = [-math.log1p(-p / 100) for p in marks]
     least = (ends[1] - ends[0]) / 6.0
     kept: list[int] = []
