@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -39,21 +39,15 @@ class Taken(NamedTuple):
 class Rest:
     """All that may change to take up a difference: constants, other effects' scales, ordinary errors of measurement."""
 
-    def __init__(self, columns: Sequence[Array] | Array, trials: int) -> None:
+    def __init__(self, columns: Array, trials: int) -> None:
         """Take the change of all forces by one prior SD of each coordinate.
 
         Args:
-            columns: each of shape (samples of all trials,), F0; or a matrix of them.
+            columns: shape (samples of all trials, coordinates), F0.
             trials: how many there are.
         """
-        self._columns = np.column_stack(list(columns)) if not isinstance(columns, np.ndarray) else columns
+        self._columns = columns
         self._weight = np.sqrt(WORTH * trials / self._columns.shape[0]) / WORTH_SD
-
-    def without(self, i: int) -> Rest:
-        """The same but for one coordinate."""
-        made = Rest.__new__(Rest)
-        made._columns, made._weight = np.delete(self._columns, i, axis=1), self._weight
-        return made
 
     def take(self, difference: Array) -> Taken:
         """Penalised least squares of data minus model, F0, shape (samples,); NaN where these are not finite."""
