@@ -140,7 +140,7 @@ def table(found: Sequence[Score]) -> str:
 
 
 # Scores that are no share of cases, with their decimals.
-_DECIMALS = {"gain": 2, "calibration": 3, "calibration_exact": 3, "calibration_artefacts": 3}
+_DECIMALS = {"gain": 2, "calibration": 3, "calibration_families": 3, "calibration_exact": 3, "calibration_artefacts": 3}
 
 
 def _number(s: Score, value: float | None) -> str:
