@@ -31,6 +31,8 @@ _LEAST_F0, _MOST_F0 = 0.003, 0.05
 _NEAR = 0.4
 _WEAKER = 4
 _LINEAR, _BESIDE = 1.7, 0.3
+# What a scale is changed by at once: fits of large effects end early and leave too much.
+_AT_ONCE = (0.5, 2.0)
 # What one effect may change of the force before any refit (RMS), F0: more, and it is hardly one effect among others.
 _USUAL_CHANGE_F0 = 0.2
 # What stands in for a part of the base changes more.
@@ -209,7 +211,7 @@ class Sized:
         found = self.beside_rest(concealed)
         # A size that is not finite fails every comparison: such a fibre is not usable.
         if any(size < _LEAST_F0 or size > _MOST_F0 for size in found):
-            factors = [float(np.clip(s / max(f, 1e-9), 0.3, 3.0)) for s, f in zip(sizes, found, strict=True)]
+            factors = [float(np.clip(s / max(f, 1e-9), *_AT_ONCE)) for s, f in zip(sizes, found, strict=True)]
             wanted = self._kept(
                 [
                     c._replace(scale=min(c.scale * factor, a.most))
