@@ -14,8 +14,9 @@ from scipy.optimize import least_squares
 from xb_muscle_ros.cli.main import main
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, MECHANISMS, Name
 from xb_muscle_ros.prove.generator.case import Concealed, dressed
-from xb_muscle_ros.prove.generator.composite import Composite, Sized, make_composite
+from xb_muscle_ros.prove.generator.composite import Composite, make_composite
 from xb_muscle_ros.prove.generator.composite_mix import PARTS, CompositeSpec, composite_specs
+from xb_muscle_ros.prove.generator.composite_sizes import Sized
 from xb_muscle_ros.prove.generator.effects import EFFECTS, OUTSIDE
 from xb_muscle_ros.prove.generator.ordinary import ARTEFACTS, ORDINARY, draw_ordinary, with_artefacts
 from xb_muscle_ros.prove.generator.recording import Faults
