@@ -203,7 +203,7 @@ def test_refit_finds_the_least_of_a_bent_valley() -> None:
     data = 2.0 * np.exp(-time / 0.5) + 0.03 * np.sin(9.0 * time)
     weight = np.sqrt(WORTH * 7 / time.size) / WORTH_SD
     other = least_squares(lambda at: np.concatenate([weight * (data - model(at)), at]), np.zeros(3))
-    found = Rest(slopes(np.zeros(3)), 7).refit(data, model, slopes, 2)
+    found = Rest(slopes(np.zeros(3)), 7).refit(data, model, slopes, 2, 3)
     assert found.pulled == pytest.approx(other.x, abs=0.02)
     assert found.rms == pytest.approx(np.sqrt(np.mean((data - model(other.x)) ** 2)), rel=0.01)
     assert found.left == pytest.approx(data - model(found.pulled))

@@ -39,6 +39,8 @@ _LINEAR, _BESIDE = 1.7, 0.3
 _NEAR = 0.4
 # What a scale is changed by at once: refits of large effects end early and leave too much.
 _AT_ONCE = (0.5, 2.0)
+# How often refits take slopes anew, to scale an effect and to say its size.
+_ROUGHLY, _WELL = 0, 6
 # How often, and by what, all effects are made weaker where nobody would have kept the fibre.
 _WEAKER, _LESS = 4, 0.6
 # Steps of 1 ms are good to 0.05 % F0, the same with and without an effect.
@@ -98,19 +100,17 @@ class Sized:
         if not all(a.left >= least for a in alone):
             return concealed, [a.left for a in alone]
         concealed = self._kept([a.concealed for a in alone])
-        found = self.beside_rest(concealed)
+        found = self.beside_rest(concealed, _ROUGHLY)
         # A size that is not finite fails every comparison: such a fibre is not usable.
         if any(size < LEAST_F0 or size > MOST_F0 for size in found):
             factors = [float(np.clip(s / max(f, 1e-9), *_AT_ONCE)) for s, f in zip(sizes, found, strict=True)]
-            wanted = self._kept(
+            concealed = self._kept(
                 [
                     c._replace(scale=min(c.scale * factor, a.most))
                     for c, factor, a in zip(concealed, factors, alone, strict=True)
                 ]
             )
-            if wanted != concealed:
-                concealed, found = wanted, self.beside_rest(wanted)
-        return concealed, found
+        return concealed, self.beside_rest(concealed, _WELL)
 
     def _alone(self, concealed: Concealed, size: float) -> _Alone:
         """The effect at a scale at which it alone leaves about so much, by linear refits."""
@@ -136,15 +136,20 @@ class Sized:
             concealed = [c._replace(scale=_LESS * c.scale) for c in concealed]
         return concealed
 
-    def beside_rest(self, concealed: Sequence[Concealed]) -> list[float]:
-        """What each effect leaves if the model has all others, and all that the model has is fitted again, F0."""
+    def beside_rest(self, concealed: Sequence[Concealed], anew: int) -> list[float]:
+        """What each effect leaves if the model has all others, and all that the model has is fitted again, F0.
+
+        Args:
+            concealed: all effects.
+            anew: how often refits may take their slopes anew.
+        """
         data = self._force(concealed)
         if not np.all(np.isfinite(data)):
             return [np.nan] * len(concealed)
         whole = self._slopes(self._base, concealed)
-        return [self._left_without(i, concealed, data, whole) for i in range(len(concealed))]
+        return [self._left_without(i, concealed, data, whole, anew) for i in range(len(concealed))]
 
-    def _left_without(self, i: int, concealed: Sequence[Concealed], data: Array, whole: _Slopes) -> float:
+    def _left_without(self, i: int, concealed: Sequence[Concealed], data: Array, whole: _Slopes, anew: int) -> float:
         """RMS that a refit of everything but effect i leaves, F0."""
         others = [c for j, c in enumerate(concealed) if j != i]
         # Constants, and scales of the others, by their logarithms; then errors, in SDs.
@@ -164,19 +169,14 @@ class Sized:
             )
 
         def slopes(at: Array) -> Array:
-            return np.column_stack([self._slopes(*there(at)).columns[:, :coordinates], errors])
+            refit, scales = self._of_model(*there(at))
+            return np.column_stack([refit.jacobian, *scales, errors])
 
-        return Rest(columns, len(self._study)).refit(data, model, slopes, coordinates).rms
+        return Rest(columns, len(self._study)).refit(data, model, slopes, coordinates, anew).rms
 
     def _slopes(self, base: World, concealed: Sequence[Concealed]) -> _Slopes:
         """Slopes at a truth."""
-        refit = Refit(base, self.stimuli, lambda world: dressed(concealed, world), _COARSEST)
-        plain = np.concatenate(refit.plain())
-        scales = []
-        for i, c in enumerate(concealed):
-            more = [*concealed[:i], c._replace(scale=1.05 * c.scale), *concealed[i + 1 :]]
-            moved = study_forces(dressed(more, base), self.stimuli, _COARSEST)
-            scales.append((np.concatenate(moved) - plain) / 0.05)
+        refit, scales = self._of_model(base, concealed)
         errors = error_columns(
             lambda shift, gain: study_forces(
                 dressed(concealed, base), [_moved(s, shift, gain) for s in self.stimuli], _COARSEST
@@ -184,6 +184,17 @@ class Sized:
             self._study, refit.plain(), ORDINARY,
         )  # fmt: skip
         return _Slopes(refit, np.column_stack([refit.jacobian, *scales, *errors]), refit.jacobian.shape[1])
+
+    def _of_model(self, base: World, concealed: Sequence[Concealed]) -> tuple[Refit, list[Array]]:
+        """Slopes by constants (in the refit) and by logarithms of the effects' scales."""
+        refit = Refit(base, self.stimuli, lambda world: dressed(concealed, world), _COARSEST)
+        plain = np.concatenate(refit.plain())
+        scales = []
+        for i, c in enumerate(concealed):
+            more = [*concealed[:i], c._replace(scale=1.05 * c.scale), *concealed[i + 1 :]]
+            moved = study_forces(dressed(more, base), self.stimuli, _COARSEST)
+            scales.append((np.concatenate(moved) - plain) / 0.05)
+        return refit, scales
 
     def _force(self, concealed: Sequence[Concealed]) -> Array:
         return np.concatenate(study_forces(dressed(concealed, self._base), self.stimuli, _COARSEST))
