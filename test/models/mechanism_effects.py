@@ -8,7 +8,7 @@ EFFECT: Mapping[str, Mapping[str, float]] = {
     "viscous_drag": {"drag": 0.01},
     "passive_viscoelasticity": {"pv_stiffness": 1.0, "pv_tau": 0.05, "pv_ratio": 0.5},
     "weakly_bound_heads": {"weak_stiffness": 40.0, "weak_detachment": 500.0},
-    "filament_friction": {"friction_force": 0.1, "friction_way": 0.01, "friction_release": 5.0},
+    "filament_friction": {"friction_force": 0.2, "friction_way": 0.01, "friction_release": 5.0},
     "active_titin": {"titin_stiffness": 2.0, "titin_calcium": 0.5},
     "static_calcium_stiffness": {"calcium_stiffness": 2.0, "stiffness_calcium": 0.5},
     "length_dependent_activation": {"calcium_per_length": 2.0},

@@ -197,7 +197,7 @@ def test_friction_is_the_same_at_any_speed_and_turns_with_the_movement() -> None
         outputs = muscle.outputs_of(states)
         spring = fibre.values["kpe"] * fibre.values["gamma"] * np.maximum(LENGTH, 0.0) + fibre.values["Fpe0"]
         np.testing.assert_allclose(
-            outputs["force_pe_f0"] - spring, 0.2 * outputs["n_on"] * found[-1], atol=1e-12, rtol=1e-12
+            outputs["force_pe_f0"] - spring, 0.2 * outputs["q0"] * found[-1], atol=1e-12, rtol=1e-12
         )
     np.testing.assert_allclose(found[0], found[1], atol=2e-4)
     # A tenth of the way in, all of it is spring; at the end of stretch and of shortening, it slides.

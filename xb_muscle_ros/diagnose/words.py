@@ -31,8 +31,8 @@ _WORDS: Mapping[Name, Words] = {
         "weakly bound heads", "heads that bind and let go quickly and hold for a moment when the fibre is stretched"
     ),
     Name.FILAMENT_FRICTION: Words(
-        "friction between filaments",
-        "an element that is elastic for a short way and then slides at a constant force, however fast the stretch",
+        "friction of bound heads",
+        "bound heads are elastic for a short way and then slide at a constant force, however fast the stretch",
     ),
     Name.ACTIVE_TITIN: Words(
         "active titin", "a spring that engages when the fibre is activated and is stretched from there on"

@@ -105,9 +105,9 @@ _ROWS = (
     Entry(
         "filament_friction",
         "friction_force",
-        0.2,
+        0.4,
         {"friction_way": 0.7, "friction_release": 1.5},
-        tuple({"friction_force": 0.1, "friction_way": 0.01, "friction_release": rate} for rate in (5.0, 50.0)),
+        tuple({"friction_force": 0.3, "friction_way": 0.007, "friction_release": rate} for rate in (8.0, 45.0)),
     ),
     Entry("strain_recruited_heads", "strain_recruitment", 150.0, starts=({"strain_recruitment": 60.0},)),
     Entry(

@@ -133,7 +133,7 @@ def _slipping(truth: Truth, scale: float, shape: Shape) -> Truth:
     return truth.adding(
         lambda s, answer: (
             scale
-            * answer.n_on
+            * answer.bound
             * beside.slipping_friction(s.length, shape["way"], shape["unevenness"], shape["release_s"])
         )
     )
@@ -246,7 +246,7 @@ _ROWS = (
         _set(At.WEAK_STIFFNESS, rate=At.WEAK_RATE, strain=At.WEAK_STRAIN, lag=At.WEAK_LAG),
     ),
     Effect(
-        Name.FILAMENT_FRICTION.value, "friction at all sites, F0", _ALL, 0.08, 0.6,
+        Name.FILAMENT_FRICTION.value, "friction if all heads were bound, F0", _ALL, 0.2, 1.5,
         _between(way=(0.004, 0.02), unevenness=(0.1, 0.5), release_s=(0.02, 0.5)), _slipping,
     ),
     Effect(
