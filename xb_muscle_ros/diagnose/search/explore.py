@@ -203,7 +203,9 @@ class Explorer:
                 found[name] = [promise(one, name) for one in linear]
             except (UserError, np.linalg.LinAlgError):
                 continue
-            self.promised[ordered((*names, name))] = tuple(p.mean_square_f0 for p in found[name])
+            squares = tuple(p.mean_square_f0 for p in found[name])
+            if np.all(np.isfinite(squares)):
+                self.promised[ordered((*names, name))] = squares
         return found
 
     def step(self, names: Names, count: int, blind: bool) -> list[Names]:

@@ -24,7 +24,8 @@ from xb_muscle_ros.models.fibre_file import Fibre
 Array = npt.NDArray[np.float64]
 Names = tuple[Name, ...]
 
-_SATURATING = f"pCa {F0_ANCHOR.pca:g}"
+SATURATING = f"pCa {F0_ANCHOR.pca:g}"
+"""Solution whose isometric force is F0."""
 BEYOND = 6.0
 """An artefact that is named may be so much larger than an ordinary one."""
 
@@ -78,8 +79,8 @@ class System:
         kept = tuple(t for t in self.trials if t.name not in held_out)
         made = replace(self, trials=kept, weights=self.weights[keep])
         # Forces are in units of the isometric force at saturating calcium, which holds though nobody shows it.
-        saturating = [t for t in self.trials if t.solution == _SATURATING]
-        if saturating and not any(t.solution == _SATURATING for t in kept):
+        saturating = [t for t in self.trials if t.solution == SATURATING]
+        if saturating and not any(t.solution == SATURATING for t in kept):
             made = replace(made, features=(*self.features, F0_ANCHOR))
         return made
 
