@@ -38,8 +38,9 @@ def test_starts_lie_within_the_table_and_the_coordinates(name: Name) -> None:
     ("model", "absent"),
     [
         ("3state_coop", {"series_compliance", "thin_filament_cooperativity", "thick_filament_cooperativity"}),
-        ("2state_coop", {"series_compliance", "thin_filament_cooperativity", "strain_recruited_heads"}),
-        ("2state_rigid", {"strain_recruited_heads"}),
+        ("2state_coop", {"series_compliance", "thin_filament_cooperativity", "strain_recruited_heads",
+                         "persistent_thick_filament"}),
+        ("2state_rigid", {"strain_recruited_heads", "persistent_thick_filament"}),
         ("4state_coop", {"series_compliance", "thin_filament_cooperativity", "thick_filament_cooperativity",
                          "forcible_detachment"}),
     ],

@@ -33,6 +33,9 @@ def add(subparsers: Subparsers) -> None:
     parser.add_argument("--method", help="how heads are distributed over strain (default: the fibre file's)")
     add_reading(parser)
     parser.add_argument(
+        "--features", type=Path, metavar="JSON", help="measured SRS and isometric force to be met beside the traces"
+    )
+    parser.add_argument(
         "--predict",
         type=Path,
         metavar="JSON",
@@ -66,6 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
         work_options_of(arguments, journal=out / "journal.jsonl"),
         known=known_of(arguments),
         only=arguments.trials_of,
+        features=arguments.features,
         predict=arguments.predict,
     )
     print(terminal_text(found))

@@ -141,10 +141,13 @@ def made(fibres: tuple[str, ...], effects: tuple[Effect, ...], unknown_f0: float
             measured = force + total + rest + NOISE_F0 * noise / rms(noise)
             before, after = force + 0.3 * total, force + 0.94 * total
             level = 0.02 * (1.0 + random.normal(0.0, 0.5)) * force
+            fits = (before, after) if effects else (before, before)
+            unseen = (
+                (before + 0.5 * level - 0.1 * total, after + 0.25 * level) if effects else (before + 0.5 * level,) * 2
+            )
             out.append(
                 TrialTraces(
-                    fibre, f"{fibre}_pca{10 * pca:.0f}", time_s, length, measured, 0.93 * force, before, after,
-                    before + 0.5 * level - 0.1 * total, after + 0.25 * level,
+                    fibre, f"{fibre}_pca{10 * pca:.0f}", time_s, length, measured, 0.93 * force, *fits, *unseen,
                     {e.name: after - 0.94 * scale * added[e.name] for e in effects},
                 )
             )  # fmt: skip
@@ -215,7 +218,8 @@ def components(
         share = min(1.0, 0.45 * rms(adds) ** 2 / mismatch)
         out.append(
             Component(
-                e.name, e.kind, e.family, e.members, e.probability, share, gain_of(traces, e.name), (e.parameter,),
+                e.name, e.kind, e.family, e.members, e.probability, share, gain_of(traces, e.name),
+                (e.parameter if len(fibres) > 1 else replace(e.parameter, spread=None),),
                 e.direction, ("weakly_bound_heads",) if e.name == "viscous_drag" else (), tuple(rows),
             )
         )  # fmt: skip
@@ -265,6 +269,8 @@ def sample(
         )
         for of in ("before", "after")
     )
+    left = Law(fibres[0], 0.087, "force", 0.11, 0.38, tuple(np.geomspace(0.002, 5.0, 11).tolist()),
+               (0.0, 0.0, 0.001, 0.0, 0.004, 0.003, 0.0, 0.0, 0.0, 0.001, 0.0), {"constant": 0.2})  # fmt: skip
     law = Law(
         fibres[0], 0.0118, "activation", 0.42, 0.63, tuple(np.geomspace(0.002, 5.0, 11).tolist()),
         (0.0, 0.002, 0.011, 0.006, 0.0, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0),
@@ -288,7 +294,8 @@ def sample(
     d = Diagnosis(
         FORMAT, fibres, "3state_coop", "gaussian", False, 1, 81.2, verdict, mechanisms, parts, explained,
         places(traces, rows, "before_f0"), 0.002, True,
-        Remaining(after.train_rmsd_f0, NOISE_F0, places(traces, rows, "after_f0"), law), law, before, after,
+        Remaining(after.train_rmsd_f0, NOISE_F0, places(traces, rows, "after_f0"), left if effects else law),
+        law, before, after,
         gain_of(traces, ""), 0.7 * (after.heldout_rmsd_f0 or 0.0), tuple(sets),
         study_rows(traces, effects, fibres), rows, tuple(nuisances),
         features=(
@@ -352,3 +359,46 @@ ALL = {
     "one_fibre": one_fibre, "five_fibres": five_fibres, "nothing": nothing, "unexplained": unexplained,
     "ambiguous": ambiguous, "measurement": measurement,
 }  # fmt: skip
+
+
+def many(fibres: int, trials: int, phases: int, parts: int, long: bool = False) -> Sample:
+    """As many of everything as asked for, with short or with long names."""
+    random = np.random.default_rng(fibres + trials)
+    first = one_fibre()
+    d, like = first.diagnosis, first.traces[0]
+    names = tuple(("a_muscle_of_some_animal_" if long else "") + f"18Dec2017{k}" for k in range(fibres))
+    kinds = [("of_the_long_and_winding_" if long else "") + f"phase_{k}" for k in range(phases)]
+    rows, traces = [], []
+    maps: list[dict[str, Any]] = [{}, {}]
+    components_ = []
+    for k in range(parts):
+        likeliest = d.components[k % len(d.components)]
+        known = d.components[k % 3]
+        members = ("static_calcium_stiffness", "thin_filament_cooperativity") if long else likeliest.members
+        value = max(0.99 - 0.9 * k / parts, 0.0)
+        of = tuple(OfFibre(f, float(random.uniform()), 0.1, known.heldout_gain, ()) for f in names)
+        components_.append(
+            replace(likeliest, name=f"part_{k}", members=members, inclusion_probability=value, by_fibre=of,
+                    heldout_gain=known.heldout_gain)
+        )  # fmt: skip
+    for fibre in names:
+        sizes = 0.05 * random.normal(size=(trials, phases))
+        for i in range(trials):
+            trial = f"{fibre}_amp383_trial_{i:02d}" + ("_of_very_many_of_the_same_kind" if long else "")
+            before = float(random.uniform(0.01, 0.06))
+            rows.append(
+                OfTrial(fibre, trial, 4.5 + 0.25 * (i % 9), PHASES, 0.001, "window", 99, before, 0.6 * before, before,
+                        float(random.uniform(0.5, 1.2)) * before)
+            )  # fmt: skip
+            shown = {c.name: like.after_f0 - 0.01 * random.normal() for c in components_[:7]}
+            traces.append(replace(like, fibre=fibre, trial=trial, without_f0=shown))
+        listed = [rows[-trials + i].trial for i in range(trials)]
+        for maps_of, scale in zip(maps, (1.0, 0.4), strict=True):
+            table = {"trials": listed, "phases": kinds, "rms_f0": (1.2 * scale * np.abs(sizes)).tolist()}
+            maps_of[fibre] = {**table, "mean_f0": (scale * sizes).tolist(), "counts": (sizes > 0.05).tolist()}
+    study = tuple(replace(d.by_fibre[0], fibre=f, left_out_rmsd_f0=(0.03, 0.02) if fibres > 1 else None) for f in names)
+    made_of = replace(
+        d, fibres=names, components=tuple(components_), trials=tuple(rows), by_fibre=study, map_before=maps[0],
+        map_after=maps[1],
+    )  # fmt: skip
+    return Sample(made_of, tuple(traces))

@@ -27,6 +27,8 @@ _PRIOR_ODDS = {True: np.log(0.1), False: np.log(0.05)}
 _WORTH = 0.5
 # Form errors of mechanisms: share of what a mechanism does that its form here gets wrong.
 FORM = 0.12
+# Of a set whose curvature cannot be told.
+_NONE = -1e9
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,8 @@ class Explorer:
         chosen = range(len(self.systems)) if fibre is None else [fibre]
         fits = self.fits[names]
         own = [self._cost(self.systems[i], fits[i], self.floors_f0[i]) for i in chosen]
-        return self.odds(names) + self.adjusted(names, fibre) - float(sum(own))
+        found = self.odds(names) + self.adjusted(names, fibre) - float(sum(own))
+        return found if np.isfinite(found) else _NONE
 
     def estimates(self, names: Names) -> dict[str, list[Estimate]]:
         """Coordinates of the mechanisms of a set in every fibre, by label."""
@@ -200,9 +203,9 @@ class Explorer:
                 found[name] = [promise(one, name) for one in linear]
             except (UserError, np.linalg.LinAlgError):
                 continue
-            # What only a fit can tell promises nothing that could be averaged over.
-            if not any(np.isnan(p.mean_square_f0) for p in found[name]):
-                self.promised[ordered((*names, name))] = tuple(p.mean_square_f0 for p in found[name])
+            squares = tuple(p.mean_square_f0 for p in found[name])
+            if np.all(np.isfinite(squares)):
+                self.promised[ordered((*names, name))] = squares
         return found
 
     def step(self, names: Names, count: int, blind: bool) -> list[Names]:

@@ -81,6 +81,10 @@ class Linear:
         distance = self.point.z - np.array([c.prior_mean for c in d.problem.coordinates])
         pull = np.concatenate([((d.information if own is None else own) * distance)[free], gradient])
         curvature = (joint * weights[:, None]).T @ joint + np.diag(prior)
+        of_features = d.of_features[:, free]
+        own_size = of_features.shape[1]
+        curvature[:own_size, :own_size] += of_features.T @ of_features
+        pull[:own_size] += of_features.T @ self.point.feature
         lead = np.sqrt(np.maximum(np.diag(curvature), 1e-300))
         right = -((joint * weights[:, None]).T @ self.point.residual + pull)
         move = np.linalg.solve(curvature / lead / lead[:, None] + 1e-9 * np.eye(lead.size), right / lead) / lead

@@ -10,8 +10,7 @@ import numpy as np
 
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.figures.common import (
-    ANSWER_DOT,
-    BASE_DOT,
+    DOTS,
     WIDTH_MM,
     Figure,
     finite,
@@ -24,6 +23,8 @@ from xb_muscle_ros.diagnose.result import NAMED, Component, Diagnosis, OfStudyFi
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
 _FIBRES, _COMPONENTS = 12, 10
+# Columns in which a gain has room beside its standard error.
+_ROOMY = 6
 _ROW_MM, _DOTS_MM = 9.0, 42.0
 _DARK = 0.62
 # Candidates that no fibre gives as much are left out.
@@ -44,14 +45,15 @@ def draw_fibres(d: Diagnosis) -> Figure | None:
         axes = made.subplots(2, 1, sharex=True, height_ratios=heights) if shown else [None, made.subplots()]
         if shown:
             _matrix(axes[0], shown, fibres)
-        handles = _errors(axes[1], fibres)
-        names = [wrapped(row.fibre, 11, 2) for row in fibres]
-        axes[1].set_xticks(range(len(fibres)), names, fontsize=7 if len(fibres) < 9 else 6)
+        handles = _errors(axes[1], fibres, 1 + say.changed(d))
+        upright = len(fibres) > _ROOMY
+        names = [wrapped(row.fibre, 18, 2) if upright else wrapped(row.fibre, 11, 2) for row in fibres]
+        axes[1].set_xticks(range(len(fibres)), names, fontsize=7, rotation=90 if upright else 0)
         axes[1].set_xlim(-0.5, len(fibres) - 0.5)
         made.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
         caption = (
             "Top: inclusion probability of each component from the recordings of one fibre alone (shade and upper "
-            "number), and its held-out gain there with standard error (lower number). "
+            f"number), and its held-out gain there{'' if upright else ' with standard error'} (lower number). "
             f"Heavy frame: {NAMED:g} or more. Bottom: held-out force RMSD of each fibre, base (open) and answer "
             "(filled); squares, the fibre left out and predicted with effects as the others have them."
             f"{shown_of(len(fibres), len(d.by_fibre), 'fibres', 'the first given')}"
@@ -78,7 +80,6 @@ def _matrix(axis: Any, shown: Sequence[Component], fibres: Sequence[OfStudyFibre
     # From white to a blue that print in grey keeps apart.
     colours = mpl.colors.LinearSegmentedColormap.from_list("probability", ["white", MODEL])
     axis.imshow(values, cmap=colours, vmin=0.0, vmax=1.0, aspect="auto")
-    small = 6.5 if len(fibres) < 9 else 5.0
     for i, of in enumerate(rows):
         for j, fibre in enumerate(fibres):
             if not math.isfinite(values[i, j]):
@@ -87,7 +88,8 @@ def _matrix(axis: Any, shown: Sequence[Component], fibres: Sequence[OfStudyFibre
             colour = "white" if values[i, j] > _DARK else "black"
             axis.text(j, i - 0.17, say.probability(values[i, j]), ha="center", va="center", fontsize=7.5, color=colour)
             told = say.gain(of[fibre.fibre].heldout_gain)
-            axis.text(j, i + 0.25, told, ha="center", va="center", fontsize=small, color=colour)
+            told = told if len(fibres) <= _ROOMY else told.split(" ")[0]
+            axis.text(j, i + 0.25, told, ha="center", va="center", fontsize=6.5, color=colour)
             if values[i, j] >= NAMED:
                 axis.add_patch(Rectangle((j - 0.47, i - 0.45), 0.94, 0.9, fill=False, edgecolor="black", linewidth=1.1))
     axis.set_yticks(range(len(shown)), [wrapped(say.title(c), 30) for c in shown], fontsize=7)
@@ -95,7 +97,7 @@ def _matrix(axis: Any, shown: Sequence[Component], fibres: Sequence[OfStudyFibre
     axis.spines[:].set_visible(False)
 
 
-def _errors(axis: Any, fibres: Sequence[OfStudyFibre]) -> list[Any]:
+def _errors(axis: Any, fibres: Sequence[OfStudyFibre], models: int) -> list[Any]:
     from matplotlib.ticker import MaxNLocator
 
     unseen = any(row.before.heldout_rmsd_f0 is not None for row in fibres)
@@ -103,9 +105,9 @@ def _errors(axis: Any, fibres: Sequence[OfStudyFibre]) -> list[Any]:
     for k, row in enumerate(fibres):
         scores = (row.before, row.after)
         pair = [s.heldout_rmsd_f0 if unseen else s.train_rmsd_f0 for s in scores]
-        handles += _pair(axis, k - (0.13 if row.left_out_rmsd_f0 else 0.0), pair, "o", "")
+        handles += _pair(axis, k - (0.13 if row.left_out_rmsd_f0 else 0.0), pair[:models], "o", "")
         if row.left_out_rmsd_f0:
-            handles += _pair(axis, k + 0.13, row.left_out_rmsd_f0, "s", ", fibre left out")
+            handles += _pair(axis, k + 0.13, row.left_out_rmsd_f0[:models], "s", ", fibre left out")
     axis.set_ylim(0.0, 1.08 * axis.get_ylim()[1])
     axis.yaxis.set_major_locator(MaxNLocator(5))
     axis.set_ylabel(f"{'Held-out force' if unseen else 'Force'} RMSD (% F$_0$)")
@@ -119,7 +121,7 @@ def _pair(axis: Any, at: float, pair: Sequence[float | None], mark: str, more: s
     if len(known) == 2:
         axis.plot([at, at], known, color=DATA, linewidth=1.2, zorder=1)
     handles: list[Any] = []
-    for value, look, colour in zip(pair, (BASE_DOT, ANSWER_DOT), (SECOND, MODEL), strict=True):
+    for value, look, colour in zip(pair, DOTS, (SECOND, MODEL), strict=False):
         for y in finite([value]):
             changed = {**look, "marker": mark, "markeredgecolor": colour, "label": look["label"] + more}
             handles += axis.plot([at], [100.0 * y], markersize=5, **changed)
