@@ -173,7 +173,7 @@ _CASES = (
     *(_pooled(model) for model in _BASES),
     *(_single(name, model) for model in _BASES for name in FIBRES),
     Case(
-        "rat", f"Rat soleus fibre {RAT_SOLEUS}, 1 kHz", _RAT, _KILOHERTZ, (r"amp383_rt1ms_pca\d+",),
+        "rat", f"Rat soleus fibre {RAT_SOLEUS}", _RAT, _KILOHERTZ, (r"amp383_rt1ms_pca\d+",),
         {"triangles": _TRIANGLES}, released("3state_coop"), False,
     ),
     Case(
