@@ -12,7 +12,8 @@ from xml.etree import ElementTree
 import pytest
 from generated_diagnoses import diagnoses
 from hypothesis import given, settings
-from sample_diagnoses import ALL, Sample, many, one_fibre
+from many_of_everything import many
+from sample_diagnoses import ALL, Sample, one_fibre
 
 from xb_muscle_ros.diagnose.report import html, prose
 from xb_muscle_ros.diagnose.report.glossary import GLOSSARY, how

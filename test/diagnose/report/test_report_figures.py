@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from layout_of_figures import boxes, outside, touching
-from sample_diagnoses import ALL, Sample, five_fibres, many, nothing, one_fibre, unexplained
+from many_of_everything import many
+from sample_diagnoses import ALL, Sample, five_fibres, nothing, one_fibre, unexplained
 
 from xb_muscle_ros.diagnose.report.figures import before_after, fibres, laws, parts, probabilities, remains
 from xb_muscle_ros.diagnose.report.figures.common import Figure, trial_labels
