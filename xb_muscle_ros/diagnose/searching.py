@@ -95,6 +95,9 @@ def searched(
         fibres.append(fibre)
         recordings.append(recording)
     compile_first(fibres, options)
+    # A fit takes a fraction of a second, less than to start the processes that would share the work.
+    if options.scheduler is None and options.processes is None:
+        options = replace(options, processes=0)
     explorer = Explorer(systems, effort.search, options)
     explorer.base()
     base = [

@@ -13,6 +13,7 @@ from xb_muscle_ros.diagnose.inference.population import Estimate, adjustment
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search.descent import Descent, Fit
 from xb_muscle_ros.diagnose.search.promise import Linear, Promise, promise
+from xb_muscle_ros.diagnose.search.starts import spread, starts_of
 from xb_muscle_ros.diagnose.search.system import Names, System, label, ordered
 from xb_muscle_ros.diagnose.search.whole import beside
 from xb_muscle_ros.errors import UserError
@@ -232,7 +233,7 @@ class Explorer:
             UserError: the model has no solution in some fibre.
         """
         if () not in self.fits:
-            self.fit([((), [[{}, *_spread(s)] for s in self.systems])], "base")
+            self.fit([((), [[{}, *spread(s)] for s in self.systems])], "base")
         if () not in self.fits:
             names = ", ".join(s.fibre.name for s in self.systems)
             raise UserError(
@@ -292,19 +293,3 @@ class Explorer:
             if rest in self.fits:
                 self.step(rest, self.effort.rivals, blind=len(names) <= 1)
         self.step(names, self.effort.rivals, blind=False)
-
-
-def starts_of(systems: Sequence[System], name: Name) -> list[list[dict[str, float]]]:
-    """Starts of a mechanism from the fibre file's own parameters."""
-    return [[dict(s) for s in CATALOGUE[name.value].starting_values(system.fibre.values)] for system in systems]
-
-
-def _spread(system: System) -> list[dict[str, float]]:
-    """Further points to start the base from: more and less cooperativity, faster and slower heads."""
-    values = system.fibre.values
-    found: list[dict[str, float]] = []
-    for factors in ({"koop": 3.0, "kon": 0.6}, {"koop": 0.4, "kon": 1.4}, {"f": 0.7, "k11": 0.5}):
-        start = {name: values[name] * factor for name, factor in factors.items() if values.get(name, 0.0) > 0.0}
-        if start and start not in found:
-            found.append(start)
-    return found
