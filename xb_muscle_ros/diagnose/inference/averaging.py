@@ -60,14 +60,19 @@ class Averaged:
         return float(np.logaddexp.reduce(self.log_evidence[here]) - np.logaddexp.reduce(self.log_evidence[~here]))
 
     def contribution_f0(self, names: Collection[Name]) -> float:
-        """Root of what the best set with some of these names takes off the mean square of the best set without, F0."""
+        """Root of what the best set with some of these names takes off the mean square of the best one without, F0.
+
+        Without them and their families: kin that does as well in their place does not make them idle.
+        """
         wanted = set(names)
+        kin = {n for n in Name if FAMILY[n] in {FAMILY[w] for w in wanted}}
         here = np.array([bool(wanted & set(s)) for s in self.sets])
-        if not np.any(here) or np.all(here):
+        without = np.array([not kin & set(s) for s in self.sets])
+        if not np.any(here) or not np.any(without):
             return 0.0
-        best = [int(np.argmax(np.where(chosen, self.log_evidence, -np.inf))) for chosen in (here, ~here)]
-        with_it, without = (float(self.mean_square_f0[k]) for k in best)
-        return math.sqrt(max(without - with_it, 0.0))
+        best = [int(np.argmax(np.where(chosen, self.log_evidence, -np.inf))) for chosen in (here, without)]
+        left = [float(self.mean_square_f0[k]) for k in best]
+        return math.sqrt(max(left[1] - left[0], 0.0))
 
     def rivals(self, name: Name, others: Sequence[Name]) -> list[Name]:
         """Names that take its place in other sets."""
