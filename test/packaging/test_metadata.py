@@ -88,6 +88,19 @@ def test_every_typed_and_data_file_is_installed(arguments: dict[str, Any]) -> No
     assert expected | {"package.xml", "resource/xb_muscle_ros"} == installed
 
 
+def test_every_file_that_code_reads_beside_itself_is_packaged(arguments: dict[str, Any]) -> None:
+    patterns = arguments["package_data"]
+    packaged = {
+        path
+        for package, globs in patterns.items()
+        for pattern in globs
+        for path in (ROOT / package.replace(".", "/")).glob(pattern)
+    }
+    found = {p for p in PACKAGE.rglob("*") if p.is_file() and p.suffix not in (".py", ".pyc", ".so", ".nbi", ".nbc")}
+    assert found == packaged
+    assert {p.name for p in found} >= {"report.css", "page.html.j2"}
+
+
 def test_programs_can_be_run_by_ros2_run() -> None:
     programs = list((ROOT / "scripts" / "ros").iterdir())
     assert {path.name for path in programs} == {"muscle_node", "plant_node", "xb_muscle"}

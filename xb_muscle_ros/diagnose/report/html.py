@@ -10,7 +10,7 @@ from importlib import resources
 from typing import Any, NamedTuple
 
 import jinja2
-from markupsafe import Markup, escape
+from jinja2.filters import do_forceescape, do_mark_safe
 
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.figures.common import Figure, trial_labels
@@ -93,7 +93,7 @@ def _context(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Any]:
         "summary": summary(d),
         "figures": _figures(d, traces),
         "glossary": GLOSSARY,
-        "style": Markup(source("report.css")),
+        "style": do_mark_safe(source("report.css")),
         "likely": likely,
         "unlikely": [c for c in d.components if c not in likely],
         "nuisances": sorted(d.nuisances, key=lambda n: -_beyond(n)),
@@ -135,16 +135,16 @@ def _printable(value: object) -> object:
     """What no page may hold becomes U+FFFD; what is unknown a dash."""
     if value is None:
         return say.NOTHING
-    if not isinstance(value, str) or isinstance(value, Markup):
+    if not isinstance(value, str) or hasattr(value, "__html__"):
         return value
     kept = "".join(c if c >= " " or c in "\t\n" else "\ufffd" for c in value)
     return kept.encode("utf-8", "replace").decode("utf-8")
 
 
-def _units(text: object) -> Markup:
+def _units(text: object) -> str:
     """Words of the tool's own, with F0 and L0 as physiologists print them."""
-    told = _TIED.sub("\u00a0", str(escape(_printable(str(text)))))
-    return Markup(_UNITS.sub(r"\1<sub>0</sub>", told))
+    told = _TIED.sub("\u00a0", str(do_forceescape(str(_printable(str(text))))))
+    return do_mark_safe(_UNITS.sub(r"\1<sub>0</sub>", told))
 
 
 def _signed(value_f0: float) -> str:

@@ -174,7 +174,7 @@ def _effect(d: Diagnosis) -> str:
 
 def _remains(d: Diagnosis) -> str:
     places = d.remaining.where
-    out = f"{say.force(d.remaining.rmsd_f0)} remain"
+    out = f"{'They leave' if len(d.named) > 1 else 'It leaves'} {say.force(d.remaining.rmsd_f0)}"
     return f"{out}, most in the {say.where(d, places)}" if places else f"{out}, and no place stands out"
 
 

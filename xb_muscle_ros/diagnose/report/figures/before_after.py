@@ -131,7 +131,7 @@ def _forces(part: Any, d: Diagnosis, chosen: Sequence[OfTrial], of: dict[Any, Tr
             bottom.plot(*thinned(t.time_s, left), **look)
             limit = max([limit, *finite([np.nanmax(np.abs(left)) if np.any(np.isfinite(left)) else None])])
         low, high = (force(value, "") for value in errors(d, row))
-        top.set_title(f"{wrapped(labels[key(row)], 34, 1)}\nRMSD {low} → {high} % F$_0$", loc="left", fontsize=7.5)
+        top.set_title(f"{wrapped(labels[key(row)], 30, 1)}\nRMSD {low} → {high} % F$_0$", loc="left", fontsize=7)
         top.yaxis.set_major_locator(MaxNLocator(4))
         bottom.yaxis.set_major_locator(MaxNLocator(3))
         bottom.xaxis.set_major_locator(MaxNLocator(5))

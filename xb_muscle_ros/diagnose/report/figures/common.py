@@ -33,6 +33,7 @@ BASE_DOT: dict[str, Any] = {
 ANSWER_DOT: dict[str, Any] = {"marker": "o", "color": MODEL, "linestyle": "none", "label": "answer"}
 _BINS = 450
 _NAME = 26
+_CLIP = re.compile(r"\bp[0-9a-f]{10}\b")
 
 
 class Figure(NamedTuple):
@@ -155,5 +156,7 @@ def svg(made: Any) -> str:
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         made.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     drawn = text.getvalue()
-    # Without the document type, which names a file elsewhere.
-    return drawn[drawn.index("<svg") :]
+    # Without the document type, which names a file elsewhere. Clips are named after coordinates whose last bits the
+    # layout's solver leaves to chance: here they are numbered.
+    numbers: dict[str, str] = {}
+    return _CLIP.sub(lambda found: numbers.setdefault(found[0], f"clip{len(numbers)}"), drawn[drawn.index("<svg") :])

@@ -24,6 +24,8 @@ from xb_muscle_ros.diagnose.result import NAMED, Component, Diagnosis, OfStudyFi
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
 _FIBRES, _COMPONENTS = 12, 10
+# Columns in which a gain has room beside its standard error.
+_ROOMY = 6
 _ROW_MM, _DOTS_MM = 9.0, 42.0
 _DARK = 0.62
 # Candidates that no fibre gives as much are left out.
@@ -45,13 +47,14 @@ def draw_fibres(d: Diagnosis) -> Figure | None:
         if shown:
             _matrix(axes[0], shown, fibres)
         handles = _errors(axes[1], fibres)
-        names = [wrapped(row.fibre, 11, 2) for row in fibres]
-        axes[1].set_xticks(range(len(fibres)), names, fontsize=7 if len(fibres) < 9 else 6)
+        upright = len(fibres) > _ROOMY
+        names = [wrapped(row.fibre, 18, 2) if upright else wrapped(row.fibre, 11, 2) for row in fibres]
+        axes[1].set_xticks(range(len(fibres)), names, fontsize=7, rotation=90 if upright else 0)
         axes[1].set_xlim(-0.5, len(fibres) - 0.5)
         made.legend(handles=handles, loc="outside lower center", ncols=4, frameon=False)
         caption = (
             "Top: inclusion probability of each component from the recordings of one fibre alone (shade and upper "
-            "number), and its held-out gain there with standard error (lower number). "
+            f"number), and its held-out gain there{'' if upright else ' with standard error'} (lower number). "
             f"Heavy frame: {NAMED:g} or more. Bottom: held-out force RMSD of each fibre, base (open) and answer "
             "(filled); squares, the fibre left out and predicted with effects as the others have them."
             f"{shown_of(len(fibres), len(d.by_fibre), 'fibres', 'the first given')}"
@@ -78,7 +81,6 @@ def _matrix(axis: Any, shown: Sequence[Component], fibres: Sequence[OfStudyFibre
     # From white to a blue that print in grey keeps apart.
     colours = mpl.colors.LinearSegmentedColormap.from_list("probability", ["white", MODEL])
     axis.imshow(values, cmap=colours, vmin=0.0, vmax=1.0, aspect="auto")
-    small = 6.5 if len(fibres) < 9 else 5.0
     for i, of in enumerate(rows):
         for j, fibre in enumerate(fibres):
             if not math.isfinite(values[i, j]):
@@ -87,7 +89,8 @@ def _matrix(axis: Any, shown: Sequence[Component], fibres: Sequence[OfStudyFibre
             colour = "white" if values[i, j] > _DARK else "black"
             axis.text(j, i - 0.17, say.probability(values[i, j]), ha="center", va="center", fontsize=7.5, color=colour)
             told = say.gain(of[fibre.fibre].heldout_gain)
-            axis.text(j, i + 0.25, told, ha="center", va="center", fontsize=small, color=colour)
+            told = told if len(fibres) <= _ROOMY else told.split(" ")[0]
+            axis.text(j, i + 0.25, told, ha="center", va="center", fontsize=6.5, color=colour)
             if values[i, j] >= NAMED:
                 axis.add_patch(Rectangle((j - 0.47, i - 0.45), 0.94, 0.9, fill=False, edgecolor="black", linewidth=1.1))
     axis.set_yticks(range(len(shown)), [wrapped(say.title(c), 30) for c in shown], fontsize=7)

@@ -59,7 +59,7 @@ def draw_parts(d: Diagnosis, traces: Sequence[TrialTraces]) -> Figure | None:
         labels = trial_labels(d)
         for column, (row, t) in zip(axes.T, chosen, strict=True):
             handles += _column(column, t, shown)
-            column[0].set_title(wrapped(labels[key(row)], 36, 1), loc="left", fontsize=7.5)
+            column[0].set_title(wrapped(labels[key(row)], 26, 1), loc="left", fontsize=7)
         _same_scale(axes[2:-1])
         _same_scale(axes[-1:])
         _labels(axes, shown)
