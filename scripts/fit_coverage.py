@@ -2,7 +2,8 @@
 
 Each case takes the released set of one of seven fibres, changes every fitted parameter by a random factor (SD 15 %),
 lets it make trials (distribution method or Gaussian form) with noise like the real one, and fits either form from the
-released set.
+released set. With --errors ordinary errors of the measurement, drawn from their priors, are in all trials, and are
+fitted beside the parameters (fitted) or not (ignored).
 """
 
 from __future__ import annotations
@@ -18,15 +19,17 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.files import write_text
-from xb_muscle_ros.fit.coordinates import FITTED, Choice, parameter_coordinates
+from xb_muscle_ros.fit.coordinates import FITTED, Choice, fault_coordinates, parameter_coordinates
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.report import as_json
 from xb_muscle_ros.fit.run import Settings, fit
+from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY, Scope
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.made import made
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
+from xb_muscle_ros.trials.trial import Trial
 from xb_muscle_ros.work import Options, run
 
 FIBRES = ("13Dec2017a", "13Dec2017b", "14Dec2017b", "18Dec2017a", "18Dec2017b", "19Dec2017a", "7Aug2018a")
@@ -63,9 +66,16 @@ def case(task: dict[str, Any]) -> dict[str, Any]:
                 given = StretchShortenStretch(amplitude, recovery).trial("made", pca)
                 trials.append(made(muscle, given, random, substeps=substeps))
                 held.append(out)
+    if task["errors"]:
+        trials = _with_errors(trials, muscle, random, substeps)
     # Nothing but the data may say where the truth lies: no priors.
     choices = {n: Choice(prior_sd=float("inf")) for n in names}
-    problem = Problem(start, fit_trials(trials, held), parameter_coordinates(start, None, (), {}, choices), {})
+    prepared = fit_trials(trials, held)
+    coordinates = parameter_coordinates(start, None, (), {}, choices)
+    if task["errors"] == "fitted":
+        seen = [t for t in prepared if not t.held_out]
+        coordinates += fault_coordinates(ORDINARY, [t.name for t in seen], [t.solution for t in seen], {})
+    problem = Problem(start, prepared, coordinates, {})
     settings = Settings(starts=1, level=0.95 if task["intervals"] else None)
     begin = time.perf_counter()
     fitted = fit(problem, settings, Options(processes=0, quiet=True))
@@ -77,13 +87,16 @@ def case(task: dict[str, Any]) -> dict[str, Any]:
             "true": true[row["name"]],
             "value": row["value"],
             "interval": row.get("interval"),
-            "held": task["intervals"] and row["interval"][0] <= true[row["name"]] <= row["interval"][1],
+            "held": row["interval"][0] <= true[row["name"]] <= row["interval"][1],
             "closed": row.get("interval_closed"),
         }
         for row in found["parameters"]
+        if row["group"] is None
     ]
     clean = [made(muscle, t, random, 0.0, substeps).measured_f0 for t, h in zip(trials, held, strict=True) if h]
-    force = [f for f, t in zip(problem.predicted(_point(problem, rows)), problem.trials, strict=True) if t.held_out]
+    # The model's own error: at the stated calcium, as the clean force is.
+    own = np.where([c.group is None for c in problem.coordinates], fitted.best.z, 0.0)
+    force = [f for f, t in zip(problem.predicted(own), problem.trials, strict=True) if t.held_out]
     inside = [np.isin(t.time_s, p.force_time_s) for t, p in _pairs(trials, problem) if p.held_out]
     errors = [float(np.sqrt(np.mean((a - b[i]) ** 2))) for a, b, i in zip(force, clean, inside, strict=True)]
     return {
@@ -98,8 +111,20 @@ def case(task: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _point(problem: Problem, rows: list[dict[str, Any]]) -> Any:
-    return np.array([c.inward(row["value"]) for c, row in zip(problem.coordinates, rows, strict=True)])
+def _with_errors(trials: list[Trial], muscle: Muscle, random: np.random.Generator, substeps: int) -> list[Trial]:
+    """The trials made anew, with ordinary errors of the measurement drawn from their priors."""
+    study = {n: FAULTS[n].sd * random.normal() for n in ORDINARY if FAULTS[n].scope is Scope.STUDY}
+    shifts = {t.facts.pca: FAULTS["pca_shift"].sd * random.normal() for t in trials}
+    anew = []
+    for order, trial in enumerate(trials):
+        given = replace(trial, force_time_s=np.empty(0), force_n=np.empty(0))
+        # How much has run down depends on the order, which a single trial does not know.
+        errors = {**study, "run_down": 0.0, "pca_shift": shifts[trial.facts.pca]}
+        found = made(muscle, given, random, substeps=substeps, **errors)
+        left = (1.0 - study["run_down"]) ** order
+        offset = FAULTS["force_offset"].sd * random.normal()
+        anew.append(replace(found, force_n=left * found.force_n + offset * found.facts.f0_n))
+    return anew
 
 
 def _pairs(trials: list[Any], problem: Problem) -> Any:
@@ -120,7 +145,7 @@ def main(cases: int, shared: dict[str, Any], out: Path, journal: Path | None) ->
     )
     seconds = np.array([c["seconds"] for c in done])
     print(f"seconds per fit, one process: median {np.median(seconds):.1f}, most {seconds.max():.1f}")
-    if not shared["intervals"]:
+    if not (shared["intervals"] or shared["errors"]):
         return
     total, inside = 0, 0
     for name in dict.fromkeys(row["name"] for c in done for row in c["parameters"]):
@@ -141,10 +166,15 @@ if __name__ == "__main__":
     parser.add_argument("--method", choices=("gaussian", "characteristics"), default="gaussian", help="of the fit")
     parser.add_argument("--pca", nargs="+", type=float, default=list(PCAS))
     parser.add_argument("--smooth", action="store_true", help="truth and fit with the released sets' smoothing")
-    parser.add_argument("--no-intervals", action="store_true")
+    parser.add_argument(
+        "--no-intervals", action="store_true", help="no profiles; with --errors intervals are those of the curvature"
+    )
+    parser.add_argument(
+        "--errors", choices=("fitted", "ignored"), help="ordinary errors of the measurement in all trials"
+    )
     parser.add_argument("--out", type=Path, default=Path("out/coverage.json"))
     parser.add_argument("--journal", type=Path)
     given = parser.parse_args()
     chosen = {"truth": given.truth, "method": given.method, "pcas": given.pca, "intervals": not given.no_intervals}
-    chosen["smoothing"] = float(given.smooth)
+    chosen |= {"smoothing": float(given.smooth), "errors": given.errors}
     main(given.cases, chosen, given.out, given.journal)

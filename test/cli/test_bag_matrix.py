@@ -231,7 +231,7 @@ def test_lengths_far_from_l0_are_one_line_in_every_command(
     given = ["--fiber", "18Dec2017a", "--out", str(out)] + (["--processes", "0"] if command != "replay" else [])
     assert main([command, str(bag), *given]) == 2
     (said,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("xb_muscle: ")]
-    assert "length differs from L0 by -0.999 L0; allowed is -0.6 to 1" in said
+    assert "length differs from L0 by -0.999 L0; allowed is -0.9 to 1" in said
     assert "--reference-length gives another" in said
     assert not [path for path in tmp_path.rglob("*") if path.is_file() and "journal" not in path.name]
 

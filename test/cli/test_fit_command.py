@@ -9,6 +9,7 @@ import pytest
 
 from xb_muscle_ros.cli.main import main
 from xb_muscle_ros.fit.coordinates import FITTED
+from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
 from xb_muscle_ros.models.fibre_file import load_fibre
 
 QUICK = ["--free", "f", "k21", "--starts", "1", "--no-intervals", "--processes", "0"]
@@ -91,6 +92,7 @@ def test_features_alone(tmp_path: Path) -> None:
         (["--bound", "f=1"], "two numbers with a colon"),
         (["--prior", "f=x:1"], "'x' is not a number"),
         (["--nuisance", "pca_shif"], "did you mean 'pca_shift'"),
+        (["--nuisance", "none", "pca_shift"], "--nuisance none is given with others"),
         (["--free", "vmax"], "has no parameter 'vmax'"),
         (["--tie", "f"], "needed is NAME=VALUE"),
         (["--starts", "0"], "number of starts is 0"),
@@ -191,6 +193,7 @@ def test_a_mechanism_left_at_its_null_is_said(
         (["--free", "f", "--bound", "k21=1:2"], "parameter 'k21' has a bound or prior but is not fitted"),
         (["--bound", "f=1:200", "--bound", "f=1:2", "f=3:200"], "--bound f is given more than once"),
         (["--nuisance", "all=0.1"], "'all' takes no SD"),
+        (["--nuisance", "ordinary=0.1"], "'ordinary' takes no SD"),
         (["--hold-out", "pca=9"], "no trial meets the rule 'pca=9'"),
     ],
 )
@@ -199,3 +202,38 @@ def test_what_would_have_been_passed_over(
 ) -> None:
     assert main(fit(bags, tmp_path / "x.yaml", "--processes", "0", *more)) == 2
     assert words in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("more", "fitted", "absent"),
+    [
+        ([], {*ORDINARY}, "force_drift, transducer_lag"),
+        (["--nuisance", "ordinary", "transducer_lag"], {*ORDINARY, "transducer_lag"}, "force_drift"),
+        (["--nuisance", "pca_shift=0.1"], {"pca_shift"}, ", ".join(n for n in FAULTS if n != "pca_shift")),
+        (["--no-nuisance"], set(), ", ".join(FAULTS)),
+        (["--nuisance", "none"], set(), ", ".join(FAULTS)),
+    ],
+)
+def test_ordinary_errors_are_fitted_unless_asked_otherwise(
+    bags: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], fitted: set[str], absent: str
+) -> None:
+    assert main(fit(bags, tmp_path / "x.yaml", *QUICK, *more)) == 0
+    said = capsys.readouterr().out
+    assert ("errors of the measurement fitted beside: " in said) == bool(fitted)
+    assert f"taken as absent: {absent}\n" in said
+    rows = json.loads((tmp_path / "x" / "fit.json").read_text())["parameters"]
+    assert {row["name"] for row in rows if row["group"] is not None} == fitted
+    # A value for each solution and each trial.
+    assert sum(row["name"] == "pca_shift" for row in rows) == 2 * ("pca_shift" in fitted)
+
+
+def test_what_one_trial_cannot_show_is_said(bags: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(fit(bags, tmp_path / "x.yaml", *QUICK, "--hold-out", "pca=6.1")) == 0
+    said = capsys.readouterr()
+    assert "xb_muscle: warning: not fitted, since nothing in the trials shows it: run_down" in said.err
+    assert "with what its isometric force tells: " in said.out
+
+
+def test_none_and_some_errors_at_once_cannot_be(bags: str, tmp_path: Path) -> None:
+    with pytest.raises(SystemExit):
+        main(fit(bags, tmp_path / "x.yaml", "--no-nuisance", "--nuisance", "pca_shift"))

@@ -13,9 +13,15 @@ import pytest
 from xb_muscle_ros.diagnose.intake import FibreStudy, read_fibres
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import find_fibre_file
+from xb_muscle_ros.scores.noise.model import Source
+from xb_muscle_ros.scores.noise.trials import noise_of
+from xb_muscle_ros.scores.standard_error import force_noise
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.completing import Known
+from xb_muscle_ros.trials.importing import Imported, import_recordings
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
+from xb_muscle_ros.trials.readers.mapping import load_mapping
+from xb_muscle_ros.trials.readers.settings import ImportSettings
 
 A, B, C = "14Dec2017b", "18Dec2017a", "19Dec2017a"
 Make = Callable[..., Path]
@@ -170,3 +176,29 @@ def test_real_fibres(shared_data: Path, make: Make) -> None:
     studies = read_fibres(bags, names)
     assert [s.fibre.name for s in studies] == names
     assert sum(len(s.trials) for s in studies) == len(bags)
+
+
+def test_coarse_recordings_without_phases_are_read_and_said(shared_data: Path, repo_root: Path, tmp_path: Path) -> None:
+    """84 ms of rest, samples 6 ms apart and no phases: found from length, as good as the protocol's."""
+    mapping = load_mapping(repo_root / "scripts" / "datasets" / "rat_soleus_fibres.yaml")
+    settings = ImportSettings({**mapping, "fibre": A}, "test")
+    files = sorted((shared_data / "recordings" / "rat_soleus_fibres" / A).glob("*.csv"))
+    for event in import_recordings(files, settings, tmp_path / "whole"):
+        if isinstance(event, Imported):
+            bare = replace(event.trial, facts=replace(event.trial.facts, phases=()))
+            write_trial(tmp_path / "bare" / event.bag.name, bare)
+    (whole,) = read_fibres([tmp_path / "whole"], [A])
+    (bare,) = read_fibres([tmp_path / "bare"], [A])
+    assert "phases found from length (10 trials)" in bare.told
+    assert "corners of length between samples were recovered (10 trials)" in bare.told
+    assert any(line.startswith("SRS cannot be measured in 10 of 10 stretched trials") for line in bare.told)
+    for one, other in zip(whole.trials, bare.trials, strict=True):
+        assert [p.name for p in one.facts.phases] == [p.name for p in other.facts.phases]
+        starts = [[p.start_s for p in trial.facts.phases] for trial in (one, other)]
+        assert starts[0] == pytest.approx(starts[1], abs=1e-4)
+        assert np.array_equal(one.time_s, other.time_s)
+    noise = noise_of(bare.trials)
+    assert all(5e-5 < each.sd_f0 < 1e-2 for each in noise.trials)
+    assert {each.source for each in noise.trials} == {Source.CURVE}
+    # So that their isometric forces have standard errors.
+    assert all(force_noise(trial) is not None for trial in bare.trials)

@@ -185,6 +185,50 @@ def test_slack_titin_takes_hold_anew(plain: np.ndarray) -> None:
     assert stiff[-1] == pytest.approx(5.0 * held * 0.03, rel=1e-3)
 
 
+def test_friction_is_the_same_at_any_speed_and_turns_with_the_movement() -> None:
+    """Over distance, elastic and then level; without release nothing but the way counts."""
+    values = {"friction_force": 0.2, "friction_way": 0.01, "friction_release": 0.0}
+    found = []
+    for slower in (1.0, 10.0):
+        fibre = fibre_with("filament_friction", **values)
+        muscle, calcium = Muscle(fibre), np.full(TIME.size, 10.0**-0.1)
+        states = muscle.run(muscle.settle(0.0, float(calcium[0])), slower * np.diff(TIME), LENGTH, calcium)
+        found.append(states[:, muscle.state_names.index("friction")])
+        outputs = muscle.outputs_of(states)
+        spring = fibre.values["kpe"] * fibre.values["gamma"] * np.maximum(LENGTH, 0.0) + fibre.values["Fpe0"]
+        np.testing.assert_allclose(
+            outputs["force_pe_f0"] - spring, 0.2 * outputs["q0"] * found[-1], atol=1e-12, rtol=1e-12
+        )
+    np.testing.assert_allclose(found[0], found[1], atol=2e-4)
+    # A tenth of the way in, all of it is spring; at the end of stretch and of shortening, it slides.
+    tenth = 51 + int(np.argmax(LENGTH[51:] >= 1e-3))
+    assert found[0][tenth] == pytest.approx(LENGTH[tenth] / 0.01, rel=2e-2)
+    assert found[0][134] == pytest.approx(1.0, abs=2e-2)
+    assert found[0][218] == pytest.approx(-1.0, abs=2e-2)
+
+
+def test_friction_lets_go_at_rest() -> None:
+    fibre = fibre_with("filament_friction", friction_force=0.2, friction_way=0.01, friction_release=20.0)
+    muscle, calcium = Muscle(fibre), np.full(TIME.size, 10.0**-0.1)
+    states = muscle.run(muscle.settle(0.0, float(calcium[0])), np.diff(TIME), LENGTH, calcium)
+    friction = states[:, muscle.state_names.index("friction")]
+    assert friction[400] / friction[350] == pytest.approx(np.exp(-1.0), rel=1e-3)
+
+
+def test_persistence_leaves_isometric_force_and_slows_the_way_there(plain: np.ndarray) -> None:
+    slow = fibre_with("persistent_thick_filament", thick_persistence=2.0)
+    ours, theirs = (Muscle(f) for f in (slow, fibre_with(None)))
+    for pca in (4.5, 6.2, 6.4):
+        calcium = 10.0 ** (6.0 - pca)
+        settled = [m.outputs(m.settle(0.0, calcium)) for m in (ours, theirs)]
+        assert settled[0].force_f0 == pytest.approx(settled[1].force_f0, rel=1e-6)
+        assert settled[0].drx == pytest.approx(settled[1].drx, rel=1e-6)
+    # After shortening, heads that were ready still are: force is back sooner.
+    assert force(slow)[228] - plain[228] > 0.0
+    as_rates = fibre_with(None, J1=slow.values["J1"] * np.exp(-2.0), J2=slow.values["J2"] * np.exp(-2.0))
+    np.testing.assert_allclose(force(slow), force(as_rates), atol=1e-9)
+
+
 def test_stretch_recruits_as_force_would() -> None:
     long, calcium = 0.05, 10.0**-0.2
     fibre = fibre_with("strain_recruited_heads", strain_recruitment=200.0)
@@ -237,6 +281,7 @@ def test_hill_type_models_take_what_needs_no_heads(mechanism: str) -> None:
         ("hill_se+lattice_spacing", "needs heads"),
         ("hill+weakly_bound_heads", "needs heads"),
         ("2state_coop+strain_recruited_heads", "needs super-relaxed heads"),
+        ("2state_coop+persistent_thick_filament", "needs super-relaxed heads"),
         ("3state_coop+thick_filament_cooperativity", "part of this model already"),
         ("3state_coop+viscous_drag+viscous_drag", "named twice"),
         ("3state_coop+viscous_drga", "viscous_drag"),

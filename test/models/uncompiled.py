@@ -48,9 +48,10 @@ def uncompiled(model: Model, smooth: bool) -> SimpleNamespace:
     """
     text = module_text(model, smooth)
     head, _, body = text.partition("\nOK, NOT_FINITE")
-    names = head.rpartition("import (")[2].replace(",", " ").replace(")", " ").split()
+    names = head.rpartition("import (")[2].partition(")")[0].replace(",", " ").split()
     scope: dict[str, Any] = {name: getattr(intrinsics, name) for name in names}
-    scope |= {"math": _MATH, "np": np, "njit": _njit, "prange": range, "get_thread_id": lambda: 0}
+    scope |= {"math": _MATH, "np": np, "prange": range, "get_thread_id": lambda: 0}
+    scope |= {"njit": _njit, "straight_line": lambda function: function}
     assert body, "the head of generated modules has changed"
     exec(compile("OK, NOT_FINITE" + body, model.name, "exec"), scope)
     return SimpleNamespace(**scope)

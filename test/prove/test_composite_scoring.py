@@ -11,7 +11,7 @@ import pytest
 
 from xb_muscle_ros.diagnose.names import FAMILY, Name
 from xb_muscle_ros.prove.calibration import Stated, calibration_score, error, reliability
-from xb_muscle_ros.prove.composite_counting import by_family, by_size, scores
+from xb_muscle_ros.prove.composite_counting import as_families, by_family, by_size, scores
 from xb_muscle_ros.prove.composite_figures import ANSWERS, SILENT, TRUTHS, families
 from xb_muscle_ros.prove.composite_judging import JudgedComposite, judge_composite
 from xb_muscle_ros.prove.counting import Score
@@ -157,6 +157,15 @@ def test_calibration_error_by_hand(found: dict[str, Score]) -> None:
     assert found["calibration_exact"].value == pytest.approx(sum(wrong) / 13)
     # Artefacts: offset .9 for drift is right by family, pCa .3 is right.
     assert found["calibration_artefacts"].value == pytest.approx((0.1 + 0.7) / 2)
+
+
+def test_members_of_a_family_make_one_statement_of_it() -> None:
+    """A small probability of the other member says nothing wrong of the family."""
+    case = judge_composite(
+        KEY[4], said("physics", {"lattice_spacing": 0.9, "filament_overlap": 0.2, "active_titin": 0.1})
+    )
+    assert error([by_family(case.statements)]) == pytest.approx((0.1 + 0.8 + 0.1) / 3)
+    assert as_families(case.statements) == [Stated(pytest.approx(0.92), True), Stated(pytest.approx(0.1), False)]
 
 
 def test_edges_of_bins_and_nothing_stated() -> None:

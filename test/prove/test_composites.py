@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,11 @@ import pytest
 from scipy.optimize import least_squares
 
 from xb_muscle_ros.cli.main import main
-from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
+from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, MECHANISMS, Name
 from xb_muscle_ros.prove.generator.case import Concealed, dressed
-from xb_muscle_ros.prove.generator.composite import Composite, Sized, make_composite
+from xb_muscle_ros.prove.generator.composite import Composite, make_composite
 from xb_muscle_ros.prove.generator.composite_mix import PARTS, CompositeSpec, composite_specs
+from xb_muscle_ros.prove.generator.composite_sizes import Sized
 from xb_muscle_ros.prove.generator.effects import EFFECTS, OUTSIDE
 from xb_muscle_ros.prove.generator.ordinary import ARTEFACTS, ORDINARY, draw_ordinary, with_artefacts
 from xb_muscle_ros.prove.generator.recording import Faults
@@ -56,8 +58,8 @@ def test_case_follows_from_its_seed(pair: Composite) -> None:
     again = make_composite(pair.spec, 7, 1)
     assert all(np.array_equal(a, b) for a, b in zip(pair.recorded, again.recorded, strict=True))
     assert composite_entry(pair, "x") == composite_entry(again, "x")
-    other = make_composite(pair.spec, 8, 1)
-    assert other.values != pair.values
+    null = pair.spec._replace(kind="null", labels=(), sizes=())
+    assert make_composite(null, 7, 1).values != make_composite(null, 8, 1).values
 
 
 def test_effects_are_of_the_sizes_meant(pair: Composite) -> None:
@@ -179,12 +181,11 @@ def test_artefacts_leave_something(fault: Composite) -> None:
 
 
 def test_rest_takes_up_what_it_has_and_no_more() -> None:
-    random = np.random.default_rng(1)
-    columns = 0.02 * random.standard_normal((3, 4000))
-    taken = Rest(columns, 7).take(0.5 * columns[0] - 0.2 * columns[2])
+    columns = 0.02 * np.random.default_rng(1).standard_normal((4000, 3))
+    taken = Rest(columns, 7).take(columns @ [0.5, 0.0, -0.2])
     assert taken.rms < 1e-4
     assert taken.pulled == pytest.approx([0.5, 0.0, -0.2], abs=0.02)
-    assert Rest(columns, 7).without(0).take(0.5 * columns[0]).rms == pytest.approx(0.01, rel=0.05)
+    assert Rest(columns[:, 1:], 7).take(0.5 * columns[:, 0]).rms == pytest.approx(0.01, rel=0.05)
     assert np.isnan(Rest(columns, 7).take(np.full(4000, np.inf)).rms)
 
 
@@ -202,20 +203,23 @@ def test_refit_finds_the_least_of_a_bent_valley() -> None:
     data = 2.0 * np.exp(-time / 0.5) + 0.03 * np.sin(9.0 * time)
     weight = np.sqrt(WORTH * 7 / time.size) / WORTH_SD
     other = least_squares(lambda at: np.concatenate([weight * (data - model(at)), at]), np.zeros(3))
-    found = Rest(slopes(np.zeros(3)), 7).refit(data, model, slopes, 2)
+    found = Rest(slopes(np.zeros(3)), 7).refit(data, model, slopes, 2, 3)
     assert found.pulled == pytest.approx(other.x, abs=0.02)
     assert found.rms == pytest.approx(np.sqrt(np.mean((data - model(other.x)) ** 2)), rel=0.01)
     assert found.left == pytest.approx(data - model(found.pulled))
 
 
-def test_effect_that_the_rest_can_make_up_for_leaves_nothing(worlds: dict[str, World], planned: list[Planned]) -> None:
-    """A solution's pCa is ordinary error: what acts like it alone has no size."""
-    sized = Sized(worlds["3state_coop"], planned[:8], draw_ordinary(np.random.default_rng(1), planned[:8]))
-    drag = [Concealed(DRAG, 0.02, EFFECTS[DRAG].draw(np.random.default_rng(1)))]
-    difference = sized.difference(drag)
-    assert sized.plain.take(difference).rms > 0.3 * np.sqrt(np.mean(difference**2))
-    faults = Faults(pca_shift={trial.pca: 0.002 for trial in planned[:8]}, length_gain=0.0)
-    assert sized.of_faults(with_artefacts([], np.random.default_rng(1), planned[:8], faults)).rms < 1e-3
+def test_ordinary_error_leaves_next_to_nothing(worlds: dict[str, World], planned: list[Planned]) -> None:
+    """What an ordinary error changes is taken up, and so is an offset; drift is not, for it is not ordinary."""
+    study = planned[:8]
+    ordinary = draw_ordinary(np.random.default_rng(1), study)
+    sized = Sized(worlds["3state_coop"], study, ordinary)
+    shifted = replace(ordinary, pca_shift={pca: shift + 0.03 for pca, shift in ordinary.pca_shift.items()})
+    moved = replace(ordinary, offset=tuple(offset + 0.004 for offset in ordinary.offset))
+    drifting = replace(ordinary, drift=tuple(0.02 * (-1) ** i for i in range(len(study))))
+    assert sized.of_faults(shifted).rms < 1e-3
+    assert sized.of_faults(moved).rms < 3e-4
+    assert sized.of_faults(drifting).rms > 3e-3
 
 
 def test_mix_has_every_kind() -> None:
@@ -235,7 +239,7 @@ def test_mix_has_every_kind() -> None:
         assert len({FAMILY[Name(label)] for label in spec.artefacts}) == len(spec.artefacts)
         assert all(spec.model in EFFECTS[label].models for label in spec.labels)
     used = collections.Counter(label for spec in made for label in spec.labels if label not in OUTSIDE)
-    assert len(used) == 15
+    assert set(used) == {name.value for name in MECHANISMS} - {Name.TEMPERATURE.value, Name.PHOSPHATE.value}
     assert max(used.values()) - min(used.values()) <= 2
     sizes = np.array([size for spec in made for size in spec.sizes])
     assert 0.003 <= sizes.min() < sizes.max() <= 0.05
@@ -257,7 +261,9 @@ def test_study_of_many_trials(trials: int, levels: int, worlds: dict[str, World]
         assert {4.5, 9.0} <= {trial.pca for trial in made}
 
 
-def test_make_composites(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_make_composites(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    null = CompositeSpec("null", (), (), (), "2state", 7)
+    monkeypatch.setattr("xb_muscle_ros.prove.generator.composite_mix.composite_specs", lambda cases, seed: [null])
     key, out = tmp_path / "key.json", tmp_path / "b"
     command = ["prove", "make", "--kind", COMPOSITES, "--cases", "1", "--seed", "3", "--out", str(out)]
     command += ["--processes", "0", "--key", str(key)]

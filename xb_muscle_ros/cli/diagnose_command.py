@@ -32,6 +32,15 @@ def add(subparsers: Subparsers) -> None:
     parser.add_argument("--model", help="parameter set of the fibre file (default: the one the file names)")
     parser.add_argument("--method", help="how heads are distributed over strain (default: the fibre file's)")
     add_reading(parser)
+    parser.add_argument(
+        "--features", type=Path, metavar="JSON", help="measured SRS and isometric force to be met beside the traces"
+    )
+    parser.add_argument(
+        "--predict",
+        type=Path,
+        metavar="JSON",
+        help="measured SRS and isometric force: predicted and compared, never fitted",
+    )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for report and results")
     parser.add_argument("--quick", action="store_true", help="look less hard: minutes become tens of seconds")
     parser.add_argument("--seed", type=int, default=1, help="of the bootstrap (default 1)")
@@ -60,6 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
         work_options_of(arguments, journal=out / "journal.jsonl"),
         known=known_of(arguments),
         only=arguments.trials_of,
+        features=arguments.features,
+        predict=arguments.predict,
     )
     print(terminal_text(found))
     for name in ("report.html", "diagnosis.json", *found.augmented.values()):

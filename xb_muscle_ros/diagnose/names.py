@@ -17,12 +17,14 @@ class Name(str, enum.Enum):
     VISCOUS_DRAG = "viscous_drag"
     PASSIVE_VISCOELASTICITY = "passive_viscoelasticity"
     WEAKLY_BOUND_HEADS = "weakly_bound_heads"
+    FILAMENT_FRICTION = "filament_friction"
     ACTIVE_TITIN = "active_titin"
     STATIC_CALCIUM_STIFFNESS = "static_calcium_stiffness"
     LENGTH_DEPENDENT_ACTIVATION = "length_dependent_activation"
     LATTICE_SPACING = "lattice_spacing"
     FILAMENT_OVERLAP = "filament_overlap"
     STRAIN_RECRUITED_HEADS = "strain_recruited_heads"
+    PERSISTENT_THICK_FILAMENT = "persistent_thick_filament"
     FORCIBLE_DETACHMENT = "forcible_detachment"
     NONLINEAR_CROSSBRIDGE = "nonlinear_crossbridge"
     HALF_SARCOMERE_SPREAD = "half_sarcomere_spread"
@@ -53,11 +55,12 @@ class Verdict(str, enum.Enum):
 
 _FAMILIES: Mapping[str, tuple[Name, ...]] = {
     "parallel_viscoelasticity": (Name.VISCOUS_DRAG, Name.PASSIVE_VISCOELASTICITY),
-    "weak_binding": (Name.WEAKLY_BOUND_HEADS,),
+    "weak_binding": (Name.WEAKLY_BOUND_HEADS, Name.FILAMENT_FRICTION),
     "calcium_dependent_elasticity": (Name.ACTIVE_TITIN, Name.STATIC_CALCIUM_STIFFNESS),
     "length_dependence": (Name.LENGTH_DEPENDENT_ACTIVATION, Name.LATTICE_SPACING, Name.FILAMENT_OVERLAP),
     "regulation": (
         Name.STRAIN_RECRUITED_HEADS,
+        Name.PERSISTENT_THICK_FILAMENT,
         Name.THIN_FILAMENT_COOPERATIVITY,
         Name.THICK_FILAMENT_COOPERATIVITY,
     ),

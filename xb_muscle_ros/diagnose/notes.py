@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
 from xb_muscle_ros.diagnose.effort import Effort
 from xb_muscle_ros.diagnose.noise.residuals import Recordings
 from xb_muscle_ros.diagnose.search.descent import Fit
-from xb_muscle_ros.diagnose.search.system import Names, System, label
+from xb_muscle_ros.diagnose.search.system import SATURATING, Names, System, label
 from xb_muscle_ros.diagnose.words import human
 from xb_muscle_ros.fit.coordinates import Coordinate
+from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.scores.noise.model import Source
 from xb_muscle_ros.scores.noise.trials import ENOUGH
@@ -61,6 +62,15 @@ def of_fibre(given: Fibre, trials: Sequence[Trial], recordings: Recordings, syst
         *_bounds(coordinates),
         *_edges(coordinates),
     ]
+
+
+def of_folds(trials: Sequence[FitTrial], folds: Sequence[Collection[str]]) -> list[str]:
+    """A line on trials that stay in every fit."""
+    held = set().union(*folds) if folds else set()
+    kept = [t.name for t in trials if t.name not in held]
+    if not folds or not kept:
+        return []
+    return [f"{_named(kept)} stayed in every fit: {SATURATING} defines F0, so nothing is predicted there"]
 
 
 def of_search(unsolved: Sequence[Names], left_out: Sequence[str]) -> list[str]:

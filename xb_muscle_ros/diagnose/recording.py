@@ -216,6 +216,7 @@ def _notes(study: Searched, chosen: Names, effort: Effort) -> list[str]:
     for i, each in enumerate(study.studies):
         own = [
             *each.told,
+            *notes.of_folds(study.recorded[i].trials, study.judged.heldout.folds[i]),
             *notes.of_fibre(
                 each.fibre, each.trials, study.recordings[i], study.explorer.systems[i], study.explorer.fits[chosen][i]
             ),

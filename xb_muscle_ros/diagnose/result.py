@@ -332,6 +332,24 @@ class Feature:
 
 
 @dataclass(frozen=True)
+class FeatureScore:
+    """RMSD of relative SRS, predicted and measured, at conditions that no trace has.
+
+    Attributes:
+        reading: of docs/evaluate.md: ``text`` or ``released``.
+        conditions: set of conditions: ``large``, ``small`` or ``all`` reductions of SRS.
+        count: how many conditions were compared.
+        before, after: by base and answer.
+    """
+
+    reading: str
+    conditions: str
+    count: int
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
 class NextExperiment:
     """What to record next.
 
@@ -370,7 +388,7 @@ class Diagnosis:
         heldout_gain: of the answer as a whole; None where nothing was left out.
         benchmark_rmsd_f0: held-out RMSD of a non-parametric discrepancy benchmark; None where there is none.
         sets: sets averaged over, the most probable first.
-        by_fibre, trials, nuisances, features: rows.
+        by_fibre, trials, nuisances, features, feature_scores: rows.
         map_before, map_after: trials x phases residual maps for the figures (see `Significance.map`), by fibre.
         next_experiment: None where nothing is to be separated.
         augmented: files of the augmented fibres, by fibre; empty where the answer has no mechanism.
@@ -404,6 +422,7 @@ class Diagnosis:
     trials: tuple[OfTrial, ...]
     nuisances: tuple[Nuisance, ...]
     features: tuple[Feature, ...] = ()
+    feature_scores: tuple[FeatureScore, ...] = ()
     map_before: dict[str, dict[str, list[object]]] = field(default_factory=dict)
     map_after: dict[str, dict[str, list[object]]] = field(default_factory=dict)
     next_experiment: NextExperiment | None = None

@@ -8,6 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from xb_muscle_ros.diagnose.effort import QUICK, Effort
+from xb_muscle_ros.diagnose.feature_tables import FeatureTable, read_features
+from xb_muscle_ros.diagnose.featuring import with_features
 from xb_muscle_ros.diagnose.intake import FibreStudy, read_fibres
 from xb_muscle_ros.diagnose.outputs import Files, write
 from xb_muscle_ros.diagnose.recording import recorded
@@ -29,6 +31,8 @@ def diagnose_bags(
     report: bool = True,
     known: Known | None = None,
     only: str | None = None,
+    features: Path | None = None,
+    predict: Path | None = None,
 ) -> Diagnosis:
     """Diagnose the trials of some bags and write what was found.
 
@@ -44,21 +48,40 @@ def diagnose_bags(
         report: write the page as well.
         known: what is known of L0 and F0 beside bags and fibre files.
         only: with one fibre: take trials of this fibre and no other.
+        features: table of measured SRS and isometric force to be met beside the traces.
+        predict: table of measured SRS and isometric force to be predicted, never fitted.
 
     Raises:
         UserError: bags that cannot be read or do not belong together, no force, no solution at the start.
     """
     files = [fibers] if isinstance(fibers, (str, Path)) else list(fibers)
     studies = read_fibres(bags, files, model, method, known, only)
+    trials = {s.fibre.name: s.trials for s in studies}
+    data, table = (None if path is None else read_features(path, trials) for path in (features, predict))
     options = options or Options(processes=0, quiet=True)
     options = replace(options, journal=options.journal or out / "journal.jsonl")
-    found, made = diagnose(studies, QUICK if quick else Effort(), seed, options)
+    found, made = diagnose(studies, QUICK if quick else Effort(), seed, options, data, table)
     write(out, found, made, report)
     return found
 
 
-def diagnose(studies: Sequence[FibreStudy], effort: Effort, seed: int, options: Options) -> tuple[Diagnosis, Files]:
+def diagnose(
+    studies: Sequence[FibreStudy],
+    effort: Effort,
+    seed: int,
+    options: Options,
+    data: FeatureTable | None = None,
+    table: FeatureTable | None = None,
+) -> tuple[Diagnosis, Files]:
     """Diagnose a study of one fibre or of several.
+
+    Args:
+        studies: fibres with their trials.
+        effort: how hard to look.
+        seed: of the bootstrap.
+        options: where work is done.
+        data: features to be met beside the traces.
+        table: features to be predicted, never fitted.
 
     Returns:
         what was found, and what goes into files beside it.
@@ -67,6 +90,10 @@ def diagnose(studies: Sequence[FibreStudy], effort: Effort, seed: int, options: 
         UserError: see `diagnose_bags`.
     """
     begun = time.monotonic()
-    study = searched(studies, effort, seed, options)
+    study = searched(studies, effort, seed, options, {} if data is None else data.features)
     found, made = recorded(study, effort, seed)
+    if data is not None:
+        found = replace(found, notes=(*found.notes, *data.told))
+    if table is not None:
+        found = with_features(found, study, table)
     return replace(found, seconds=time.monotonic() - begun), made

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import Names, System
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.data import fit_trials
+from xb_muscle_ros.fit.features import Feature
 from xb_muscle_ros.fit.start import with_constants
 from xb_muscle_ros.models.fibre_file import Fibre, changed
 from xb_muscle_ros.scores.noise.trials import noise_of
@@ -65,7 +67,13 @@ def around(explorer: Explorer, recorded: System, names: Names, i: int) -> Around
     return Around.of(recorded, explorer.fits[names][i], TOLD * float(np.sum(explorer.systems[i].weights)))
 
 
-def searched(studies: Sequence[FibreStudy], effort: Effort, seed: int, options: Options) -> Searched:
+def searched(
+    studies: Sequence[FibreStudy],
+    effort: Effort,
+    seed: int,
+    options: Options,
+    features: Mapping[str, tuple[Feature, ...]] = MappingProxyType({}),
+) -> Searched:
     """Search a study.
 
     Raises:
@@ -81,12 +89,15 @@ def searched(studies: Sequence[FibreStudy], effort: Effort, seed: int, options: 
         trials = fit_trials(study.trials, [False] * len(study.trials), whole=True)
         recording = Recordings(study.trials, noise_of(study.trials), effort.draws, seed)
         floor = max(FLOOR_F0, recording.usual_noise_f0())
-        systems.append(System.of(fibre, trials, floor))
+        systems.append(replace(System.of(fibre, trials, floor), features=features.get(fibre.name, ())))
         weights = np.ones(sum(t.measured_f0.size for t in trials))
         recorded.append(System(fibre, trials, weights, floor))
         fibres.append(fibre)
         recordings.append(recording)
     compile_first(fibres, options)
+    # A fit takes a fraction of a second, less than to start the processes that would share the work.
+    if options.scheduler is None and options.processes is None:
+        options = replace(options, processes=0)
     explorer = Explorer(systems, effort.search, options)
     explorer.base()
     base = [

@@ -18,6 +18,7 @@ from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.search.whole import FRAMES, absent
 from xb_muscle_ros.diagnose.searching import Searched
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.problem import Problem
 
 Array = npt.NDArray[np.float64]
@@ -129,10 +130,9 @@ def _without(study: Searched, chosen: Names, name: Name, i: int) -> list[Array] 
             problem,
             fibre=fibre,
             coordinates=tuple(problem.coordinates[j] for j in kept),
-            correction=recorded.problem(rest, fit.values).correction if problem.correction is not None else None,
+            correction=problem.correction
+            and Correction.level(np.zeros(len(kept)), problem.correction.force, problem.correction.features),
         )
-        if bare.correction is not None:
-            bare = replace(bare, correction=replace(bare.correction, at=np.zeros(len(kept))))
         return bare.predicted(z[kept])
     except UserError:
         return None

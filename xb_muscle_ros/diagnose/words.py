@@ -30,6 +30,10 @@ _WORDS: Mapping[Name, Words] = {
     Name.WEAKLY_BOUND_HEADS: Words(
         "weakly bound heads", "heads that bind and let go quickly and hold for a moment when the fibre is stretched"
     ),
+    Name.FILAMENT_FRICTION: Words(
+        "friction of bound heads",
+        "bound heads are elastic for a short way and then slide at a constant force, however fast the stretch",
+    ),
     Name.ACTIVE_TITIN: Words(
         "active titin", "a spring that engages when the fibre is activated and is stretched from there on"
     ),
@@ -45,6 +49,10 @@ _WORDS: Mapping[Name, Words] = {
     Name.FILAMENT_OVERLAP: Words("filament overlap", "the number of heads within reach changes with length"),
     Name.STRAIN_RECRUITED_HEADS: Words(
         "heads recruited by strain", "stretch wakes heads that were resting on the thick filament"
+    ),
+    Name.PERSISTENT_THICK_FILAMENT: Words(
+        "persistent thick filament",
+        "heads that force has woken stay awake after force is lost, and go to rest more slowly than the model has it",
     ),
     Name.FORCIBLE_DETACHMENT: Words(
         "forcible detachment", "heads stretched too far are torn off and bind again quickly"
@@ -74,7 +82,7 @@ _WORDS: Mapping[Name, Words] = {
 }
 _FAMILIES: Mapping[str, str] = {
     "parallel_viscoelasticity": "parallel viscoelasticity",
-    "weak_binding": "weak binding",
+    "weak_binding": "weak binding and friction",
     "calcium_dependent_elasticity": "calcium-dependent elasticity",
     "length_dependence": "length dependence of activation and attachment",
     "regulation": "regulation by the filaments",

@@ -134,9 +134,9 @@ def measured(
         for kind in ("isometric_force", "srs_conditioning") if stiffness else ("isometric_force",):
             values = np.array(cells[kind][i], dtype=np.float64)
             if np.isfinite(values).any():
-                found.append(_feature(kind, pca, 0.0, 0.0, float(np.nanmean(values))))
+                found.append(feature(kind, pca, 0.0, 0.0, float(np.nanmean(values))))
         stretches = [
-            _feature("srs_test", pca, recovery, amplitude, float(cells["srs_test"][i][j][k]))
+            feature("srs_test", pca, recovery, amplitude, float(cells["srs_test"][i][j][k]))
             for j, recovery in enumerate(tables["recovery_s"])
             for k, amplitude in enumerate(tables["amplitude_L0"])
             if stiffness and cells["srs_test"][i][j][k] is not None
@@ -165,7 +165,8 @@ def _broken(tests: Sequence[float], unconditioned: Array) -> bool:
     return reference > _ACTIVE_SRS and not -0.1 * reference < min(tests) <= max(tests) < 2.0 * reference
 
 
-def _feature(kind: str, pca: float, recovery_s: float, amplitude_l0: float, value: float) -> Feature:
+def feature(kind: str, pca: float, recovery_s: float, amplitude_l0: float, value: float) -> Feature:
+    """A measured value with the standard deviation that its kind has."""
     sd = _FORCE_SD_F0 if kind == "isometric_force" else _SRS_SD + _SRS_SHARE * abs(value)
     return Feature(kind, pca, recovery_s, amplitude_l0, value, sd)
 

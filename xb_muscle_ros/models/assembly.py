@@ -22,6 +22,8 @@ def equations(model: Composition, smooth: bool) -> Equations:
     """
     import sympy
 
+    from xb_muscle_ros.models.factoring import replaced
+
     names = [*(s.name for s in model.states), *(i.name for i in INPUTS), *(p.name for p in model.parameters)]
     symbols = {name: sympy.Symbol(name, real=True) for name in names}
     shift = sympy.Symbol("shift", real=True)
@@ -33,6 +35,7 @@ def equations(model: Composition, smooth: bool) -> Equations:
     in_fixed = _moved(parts.kinetics, -shift)
     others = [parts.others[s.name] for s in model.states[3:]]
     derivatives = [*in_fixed, *others, parts.own_velocity, symbols["velocity"]]
+    at_start = {shift: sympy.Integer(0)}
     return Equations(
         states=model.states,
         parameters=model.parameters,
@@ -41,7 +44,7 @@ def equations(model: Composition, smooth: bool) -> Equations:
         derivatives=tuple(sympy.sympify(e) for e in derivatives),
         arrival=tuple(sympy.sympify(e) for e in (*moved, *(symbols[s.name] for s in model.states[3:]))),
         rest=tuple(sympy.sympify(e) for e in (0, 0, 0, *rest_of_states(model, symbols))),
-        outputs=tuple(sympy.sympify(e).subs(shift, 0) for e in output_expressions(model, parts.q)),
+        outputs=tuple(replaced(sympy.sympify(e), at_start) for e in output_expressions(model, parts.q)),
         # The smooth form never divides by less than ln 2 / K heads.
         shares=() if smooth else ("q0", "q1", "q2"),
     )

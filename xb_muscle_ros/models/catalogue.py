@@ -101,6 +101,14 @@ _ROWS = (
         {"overlap_edge": 0.02},
         tuple({"overlap_per_length": -1.5, "overlap_edge": edge} for edge in (-0.06, -0.01)),
     ),
+    Entry("persistent_thick_filament", "thick_persistence", 2.0, starts=({"thick_persistence": 2.0},), reach=4.0),
+    Entry(
+        "filament_friction",
+        "friction_force",
+        0.4,
+        {"friction_way": 0.7, "friction_release": 1.5},
+        tuple({"friction_force": 0.3, "friction_way": 0.007, "friction_release": rate} for rate in (8.0, 45.0)),
+    ),
     Entry("strain_recruited_heads", "strain_recruitment", 150.0, starts=({"strain_recruitment": 60.0},)),
     Entry(
         "forcible_detachment",

@@ -12,7 +12,9 @@ from typing import Any
 import sympy
 from sympy.printing.c import C99CodePrinter
 from sympy.printing.pycode import PythonCodePrinter
+from sympy.simplify.cse_opts import sub_post
 
+from xb_muscle_ros.models.factoring import Factors, replaced, signed
 from xb_muscle_ros.models.symbols import CALLS
 
 Line = tuple[Any, Any]
@@ -30,12 +32,12 @@ class Program:
         known = dict(values)
         lines: list[Line] = []
         for symbol, expression in self.lines:
-            new = expression.subs(known)
+            new = replaced(expression, known)
             if new.is_Atom:
                 known[symbol] = new
             else:
                 lines.append((symbol, new))
-        return Program(lines, [r.subs(known) for r in self.results])
+        return Program(lines, [replaced(r, known) for r in self.results])
 
     def needed(self) -> Program:
         """The same program without the lines that no result uses."""
@@ -54,7 +56,9 @@ def program(expressions: Sequence[Any], prefix: str) -> Program:
     Every call of a function gets a line of its own, so that its derivative can name it instead of calling it again.
     """
     numbers = sympy.numbered_symbols(prefix, real=True)
-    shared, results = sympy.cse(list(expressions), symbols=numbers, order="none", optimizations="basic")
+    # What SymPy calls "basic" optimizations, by functions that do not look at a shared subexpression again and again.
+    basic = [(signed, sub_post), (Factors().factored, None)]
+    shared, results = sympy.cse(list(expressions), symbols=numbers, order="none", optimizations=basic)
     lines: list[Line] = []
     names: dict[Any, Any] = {}
 

@@ -23,12 +23,14 @@ from xb_muscle_ros.mechanisms.detachment.forcible import ForcibleDetachment
 from xb_muscle_ros.mechanisms.detachment.regular import RegularDetachment
 from xb_muscle_ros.mechanisms.extra import Extra, Needs
 from xb_muscle_ros.mechanisms.extras.active_titin import ActiveTitin
+from xb_muscle_ros.mechanisms.extras.filament_friction import FilamentFriction
 from xb_muscle_ros.mechanisms.extras.filament_overlap import FilamentOverlap
 from xb_muscle_ros.mechanisms.extras.half_sarcomere_spread import HalfSarcomereSpread
 from xb_muscle_ros.mechanisms.extras.lattice_spacing import LatticeSpacing
 from xb_muscle_ros.mechanisms.extras.length_dependent_activation import LengthDependentActivation
 from xb_muscle_ros.mechanisms.extras.nonlinear_crossbridge import NonlinearCrossbridge
 from xb_muscle_ros.mechanisms.extras.passive_viscoelasticity import PassiveViscoelasticity
+from xb_muscle_ros.mechanisms.extras.persistent_thick_filament import PersistentThickFilament
 from xb_muscle_ros.mechanisms.extras.phosphate import Phosphate
 from xb_muscle_ros.mechanisms.extras.static_calcium_stiffness import StaticCalciumStiffness
 from xb_muscle_ros.mechanisms.extras.strain_recruited_heads import StrainRecruitedHeads
@@ -174,6 +176,8 @@ EXTRAS: Mapping[str, type[Extra]] = MappingProxyType(
             LatticeSpacing,
             FilamentOverlap,
             StrainRecruitedHeads,
+            PersistentThickFilament,
+            FilamentFriction,
             NonlinearCrossbridge,
             HalfSarcomereSpread,
             Temperature,

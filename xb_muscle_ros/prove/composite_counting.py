@@ -66,6 +66,10 @@ def scores(judged: Sequence[JudgedComposite]) -> list[Score]:
         share("artefact_found", "artefacts beyond the ordinary: family named", _artefacts_found(of["fault"])),
         share("artefact_names_family", "artefacts of the right family among all named", _family_right(artefact_names)),
         calibration_score(
+            "calibration_families", "expected calibration error, one statement for each family of a case",
+            [as_families(j.statements) for j in judged],
+        ),
+        calibration_score(
             "calibration_exact", "expected calibration error, by name (components of one name)",
             [by_name(j.statements) for j in judged],
         ),
@@ -104,6 +108,17 @@ def _family_right(names: Iterable[JudgedName]) -> Iterator[bool]:
 def by_family(statements: Iterable[JudgedName]) -> list[Stated]:
     """Probabilities, each right where an effect of its family is there."""
     return [Stated(s.probability, s.family_right) for s in statements if s.probability is not None]
+
+
+def as_families(statements: Iterable[JudgedName]) -> list[Stated]:
+    """One probability for each family: that any of its components is there, if they are independent."""
+    absent: dict[str, float] = {}
+    right: dict[str, bool] = {}
+    for s in statements:
+        if s.probability is not None:
+            absent[s.family] = absent.get(s.family, 1.0) * (1.0 - s.probability)
+            right[s.family] = s.family_right
+    return [Stated(1.0 - probability, right[family]) for family, probability in absent.items()]
 
 
 def by_name(statements: Iterable[JudgedName]) -> list[Stated]:

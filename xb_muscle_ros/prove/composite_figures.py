@@ -106,9 +106,9 @@ def _families(path: Path, counts: Array) -> Path:
 def _by_size(path: Path, rows: Sequence[dict[str, Any]]) -> Path:
     """Share of effects found, by class of size, with 95 % intervals."""
     rows = [row for row in rows if row["n"]]
-    with figure(100.0, 72.0) as made:
+    with figure(110.0, 72.0) as made:
         axes = made.add_subplot()
-        looks = (("family", SECOND, "s", "family in the answer"), ("exact", MODEL, "o", "name in the answer"))
+        looks = (("family", SECOND, "s", "family"), ("exact", MODEL, "o", "name"))
         for shift, (name, colour, marker, label) in zip((-0.07, 0.07), looks, strict=True):
             values = np.array([row[name]["value"] for row in rows])
             low, high = (np.array([row[name][side] for row in rows]) for side in ("lower", "upper"))
@@ -124,7 +124,7 @@ def _by_size(path: Path, rows: Sequence[dict[str, Any]]) -> Path:
         axes.set_xticks(range(len(rows)), [f"{t}\n(n = {row['n']})" for t, row in zip(ticks, rows, strict=True)])
         axes.set_xlim(-0.5, len(rows) - 0.5)
         axes.set_xlabel("What the effect leaves beside the rest (% F$_0$)")
-        axes.set_ylabel("Effects found (%)")
+        axes.set_ylabel("Effects in the answer (%)")
         axes.set_ylim(-3.0, 103.0)
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False, borderpad=0.0)
         save(made, path)
@@ -145,7 +145,7 @@ def _reliability(path: Path, bins: Sequence[dict[str, Any]], score: Score) -> Pa
         )  # fmt: skip
         axes.set_ylim(-0.03, 1.03)
         axes.set_ylabel("Share with an effect of the family")
-        axes.legend(loc="upper left", frameon=False)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, borderpad=0.0)
         axes.text(
             0.98, 0.04,
             f"expected calibration error {score.value:.3f}\n95 % interval {score.lower:.3f} to {score.upper:.3f}",

@@ -55,9 +55,9 @@ and 4 % F0 of which it reaches 85 %. Intervals of shares: Clopper–Pearson.
 """
 _COMPOSITE_SIZE = """
 A size is the RMS over all samples of what a mechanism leaves if the model has everything else that is there, and
-constants, the others' scales and ordinary errors of the measurement are fitted again to first order; classes by their
-least size. A component of several members counts once, by its family, and is never right by name. Intervals:
-Clopper–Pearson; of calibration errors: bootstrap over cases.
+constants, the others' scales and ordinary errors of the measurement are fitted again; classes by their least size.
+A component of several members counts once, by its family, and is never right by name. Intervals: Clopper–Pearson; of
+calibration errors: bootstrap over cases.
 """
 
 
@@ -140,7 +140,7 @@ def table(found: Sequence[Score]) -> str:
 
 
 # Scores that are no share of cases, with their decimals.
-_DECIMALS = {"gain": 2, "calibration": 3, "calibration_exact": 3, "calibration_artefacts": 3}
+_DECIMALS = {"gain": 2, "calibration": 3, "calibration_families": 3, "calibration_exact": 3, "calibration_artefacts": 3}
 
 
 def _number(s: Score, value: float | None) -> str:

@@ -20,7 +20,7 @@ from xb_muscle_ros.scores.noise.autocovariance import covariance_of_sums
 from xb_muscle_ros.scores.noise.hum import Line, hum
 from xb_muscle_ros.scores.noise.model import Source, TrialNoise
 from xb_muscle_ros.scores.noise.pieces import evenly_sampled
-from xb_muscle_ros.scores.noise.trials import ENOUGH, by_windows, noise_of
+from xb_muscle_ros.scores.noise.trials import ENOUGH, by_windows, noise_of, steady_scatter_f0
 from xb_muscle_ros.scores.noise.windows import LEAST, isometric_window
 from xb_muscle_ros.trials.trial import Trial
 
@@ -85,8 +85,10 @@ def force_noise(trial: Trial) -> ForceNoise | None:
         noise = noise_of([trial]).trials[0]
     except UserError:
         return None
-    # Few samples and differences of neighbours show fast noise alone; an estimate's error depends on the slow.
-    fast = noise.source is Source.DIFFERENCES or noise.samples < LEAST
+    # Differences of neighbours show fast noise alone, and so do few samples, unless some of them are of steady force;
+    # an estimate's error depends on the slow.
+    few = noise.samples < LEAST and steady_scatter_f0(trial) == 0.0
+    fast = noise.source is Source.DIFFERENCES or few
     return None if fast else ForceNoise(noise, step_s)
 
 

@@ -116,34 +116,56 @@ def straight_lines(time_s: Array, length_l0: Array, tolerance: float) -> list[Li
         tolerance: how far a sample may lie off a line, in the unit of length.
     """
     lines: list[Line] = []
-    first, n = 0, time_s.size
+    times, lengths = time_s.tolist(), length_l0.tolist()
+    first, n = 0, len(times)
     while first <= n - _FEWEST:
-        line = _line(time_s, length_l0, first, first + 1)
-        last = first + 1
-        while last + 1 < n and _continues(line, time_s, float(length_l0[last + 1]), tolerance):
-            last += 1
-            line = _line(time_s, length_l0, first, last)
-        if last - first + 1 >= _FEWEST:
-            lines.append(line)
-            first = last + 1
+        line = _Growing(first, times, lengths)
+        while line.last + 1 < n and line.takes_next(tolerance):
+            line.grow()
+        if line.count >= _FEWEST:
+            lines.append(line.line)
+            first = line.last + 1
         else:
             first += 1
     return lines
 
 
-def _continues(line: Line, time_s: Array, value: float, tolerance: float) -> bool:
-    """Whether the sample after a line's last is on it, given how well so many samples tell a line."""
-    n = line.last - line.first + 1
-    widening = np.sqrt(1.0 + 1.0 / n + 12.0 * (0.5 * n) ** 2 / (n**3)) if n > 2 else 6.0**0.5
-    return bool(abs(value - line.at(float(time_s[line.last + 1]))) <= tolerance * widening)
+class _Growing:
+    """A straight line through two samples and those that follow, by sums that one more sample adds to."""
 
+    def __init__(self, first: int, times: list[float], lengths: list[float]) -> None:
+        self._first, self._times, self._lengths = first, times, lengths
+        self.last, self.count = first - 1, 0
+        # Of times since the first sample and of lengths beside it; squares and products.
+        self._time = self._length = self._squares = self._products = 0.0
+        self.grow()
+        self.grow()
 
-def _line(time_s: Array, length_l0: Array, first: int, last: int) -> Line:
-    part = slice(first, last + 1)
-    since, length = time_s[part] - time_s[first], length_l0[part]
-    apart = since - np.mean(since)
-    slope = float(apart @ length) / float(apart @ apart)
-    return Line(first, last, float(time_s[first]), float(np.mean(length) - slope * np.mean(since)), slope)
+    def grow(self) -> None:
+        """Take the next sample."""
+        self.last += 1
+        self.count += 1
+        since = self._times[self.last] - self._times[self._first]
+        beside = self._lengths[self.last] - self._lengths[self._first]
+        self._time += since
+        self._length += beside
+        self._squares += since * since
+        self._products += since * beside
+
+    @property
+    def line(self) -> Line:
+        """Least squares."""
+        mean_s, mean = self._time / self.count, self._length / self.count
+        slope = (self._products - self._time * mean) / (self._squares - self._time * mean_s)
+        level = self._lengths[self._first] + mean - slope * mean_s
+        return Line(self._first, self.last, self._times[self._first], level, slope)
+
+    def takes_next(self, tolerance: float) -> bool:
+        """Whether the next sample is on the line, given how well so many samples tell where the next one is."""
+        # Evenly sampled, the variance of a line's next value is 1 + (4 n + 2)/(n (n - 1)) times that of a sample.
+        n = self.count
+        off = self._lengths[self.last + 1] - self.line.at(self._times[self.last + 1])
+        return abs(off) <= tolerance * math.sqrt(1.0 + (4.0 * n + 2.0) / (n * (n - 1.0)))
 
 
 def _corner(

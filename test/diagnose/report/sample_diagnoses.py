@@ -7,7 +7,18 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
+from made_recordings import (
+    DETACHMENT,
+    DRAG,
+    DRIFT,
+    NOISE_F0,
+    PCAS,
+    PHASES,
+    SPRINGS,
+    Effect,
+    made,
+    rms,
+)
 
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import (
@@ -23,7 +34,6 @@ from xb_muscle_ros.diagnose.result import (
     OfFibre,
     OfStudyFibre,
     OfTrial,
-    Parameter,
     Place,
     Remaining,
     Scores,
@@ -32,13 +42,6 @@ from xb_muscle_ros.diagnose.result import (
 )
 
 Array = Any
-PCAS = (6.6, 6.4, 6.2, 6.1, 6.0, 5.8, 4.5)
-PHASES = (
-    ("isometric", 0.0, 0.2), ("conditioning_stretch", 0.2, 0.28), ("conditioning_shortening", 0.28, 0.36),
-    ("recovery", 0.36, 0.66), ("test_stretch", 0.66, 0.74), ("hold", 0.74, 1.1),
-)  # fmt: skip
-STEP_S = 0.002
-NOISE_F0 = 0.0012
 
 
 class Sample(NamedTuple):
@@ -48,107 +51,12 @@ class Sample(NamedTuple):
     traces: tuple[TrialTraces, ...]
 
 
-class Effect(NamedTuple):
-    """A component to put into made recordings.
-
-    Attributes:
-        name, kind, family, members: of the component.
-        probability: stated for it.
-        size: of its signal, about F0.
-        parameter: that the record tells.
-        direction: in words.
-    """
-
-    name: str
-    kind: Kind
-    family: str
-    members: tuple[str, ...]
-    probability: float
-    size: float
-    parameter: Parameter
-    direction: str
-
-
-DETACHMENT = Effect(
-    "forcible_detachment", Kind.MECHANISM, "heads_under_strain", ("forcible_detachment",), 0.998, 0.05,
-    Parameter("k", "1/s", 1040.0, (870.0, 1230.0), spread=120.0), "lowers force late in fast stretch",
-)  # fmt: skip
-DRAG = Effect(
-    "viscous_drag", Kind.MECHANISM, "parallel_viscoelasticity", ("viscous_drag",), 0.93, 0.02,
-    Parameter("drag", "F0·s/L0", 0.0284, (0.019, 0.0371), spread=0.009),
-    "raises force in stretch, lowers it in shortening",
-)  # fmt: skip
-SPRINGS = Effect(
-    "calcium_dependent_elasticity", Kind.MECHANISM, "calcium_dependent_elasticity",
-    ("active_titin", "static_calcium_stiffness"), 0.71, 0.012,
-    Parameter("titin_stiffness", "F0/L0", 1.31, (0.42, 2.2)), "raises force while the fibre is longer",
-)  # fmt: skip
-DRIFT = Effect(
-    "force_drift", Kind.ARTEFACT, "force_zero", ("force_drift",), 0.87, 0.015,
-    Parameter("force_drift [pCa 6.2]", "F0/s", 0.0143, (0.0094, 0.0192)), "force creeps up during a trial",
-)  # fmt: skip
 LESS_LIKELY = (
     ("weakly_bound_heads", Kind.MECHANISM, "weak_binding", 0.34), ("nonlinear_crossbridge", Kind.MECHANISM,
     "heads_under_strain", 0.22), ("half_sarcomere_spread", Kind.MECHANISM, "heterogeneity", 0.11), ("pca_shift",
     Kind.ARTEFACT, "calcium_of_solutions", 0.06), ("lattice_spacing", Kind.MECHANISM, "length_dependence", 0.031),
     ("phosphate", Kind.MECHANISM, "rates", 0.008), ("transducer_lag", Kind.ARTEFACT, "timing", 0.004),
 )  # fmt: skip
-
-
-def remembered(speed: Array, tau_s: float) -> Array:
-    """Speed through an exponential memory, L0."""
-    return lfilter([STEP_S], [1.0, -math.exp(-STEP_S / tau_s)], speed)
-
-
-def rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else math.nan
-
-
-def protocol() -> tuple[Array, Array]:
-    """Time in s and length change in L0."""
-    time_s = np.arange(0.0, PHASES[-1][2], STEP_S)
-    return time_s, np.interp(time_s, [0.2, 0.28, 0.36, 0.66, 0.74], [0.0, 0.038, 0.0, 0.0, 0.038])
-
-
-def signals(pca: float, effects: tuple[Effect, ...]) -> tuple[Array, dict[str, Array]]:
-    """Force of the base model, and of each effect, F0."""
-    time_s, length = protocol()
-    speed = np.gradient(length, time_s)
-    level = 1.0 / (1.0 + 10.0 ** (2.5 * (pca - 6.1)))
-    base = level * (1.0 + 13.0 * remembered(speed, 0.03) + 4.0 * remembered(speed, 0.25)) + 1.5 * length
-    late = np.clip(remembered(np.clip(speed, 0.0, None), 0.05) - 0.012, 0.0, None)
-    shapes = {
-        "forcible_detachment": -level * late / 0.012,
-        "viscous_drag": speed / 0.5,
-        "calcium_dependent_elasticity": level * length / 0.038,
-        "force_drift": time_s * (1.0 if pca == 6.2 else 0.1),
-    }
-    return base, {e.name: e.size * shapes[e.name] for e in effects}
-
-
-def made(fibres: tuple[str, ...], effects: tuple[Effect, ...], unknown_f0: float, seed: int = 1) -> list[TrialTraces]:
-    """Traces: the base takes a part of every effect for its own, held-out predictions are a little worse."""
-    random = np.random.default_rng(seed)
-    out = []
-    for k, fibre in enumerate(fibres):
-        for pca in PCAS:
-            time_s, length = protocol()
-            force, added = signals(pca, effects)
-            scale = 1.0 + 0.1 * math.sin(3.0 * k)
-            total = scale * sum(added.values(), np.zeros_like(force))
-            rest = unknown_f0 * np.sin(2.0 * np.pi * 6.0 * time_s) * np.exp(-np.abs(time_s - 0.7) / 0.1)
-            noise = lfilter([0.2], [1.0, -0.95], random.normal(0.0, 1.0, time_s.size))
-            measured = force + total + rest + NOISE_F0 * noise / rms(noise)
-            before, after = force + 0.3 * total, force + 0.94 * total
-            level = 0.02 * (1.0 + random.normal(0.0, 0.5)) * force
-            out.append(
-                TrialTraces(
-                    fibre, f"{fibre}_pca{10 * pca:.0f}", time_s, length, measured, 0.93 * force, before, after,
-                    before + 0.5 * level - 0.1 * total, after + 0.25 * level,
-                    {e.name: after - 0.94 * scale * added[e.name] for e in effects},
-                )
-            )  # fmt: skip
-    return out
 
 
 def trial_row(t: TrialTraces, pca: float) -> OfTrial:
@@ -215,7 +123,8 @@ def components(
         share = min(1.0, 0.45 * rms(adds) ** 2 / mismatch)
         out.append(
             Component(
-                e.name, e.kind, e.family, e.members, e.probability, share, gain_of(traces, e.name), (e.parameter,),
+                e.name, e.kind, e.family, e.members, e.probability, share, gain_of(traces, e.name),
+                (e.parameter if len(fibres) > 1 else replace(e.parameter, spread=None),),
                 e.direction, ("weakly_bound_heads",) if e.name == "viscous_drag" else (), tuple(rows),
             )
         )  # fmt: skip
@@ -265,6 +174,8 @@ def sample(
         )
         for of in ("before", "after")
     )
+    left = Law(fibres[0], 0.087, "force", 0.11, 0.38, tuple(np.geomspace(0.002, 5.0, 11).tolist()),
+               (0.0, 0.0, 0.001, 0.0, 0.004, 0.003, 0.0, 0.0, 0.0, 0.001, 0.0), {"constant": 0.2})  # fmt: skip
     law = Law(
         fibres[0], 0.0118, "activation", 0.42, 0.63, tuple(np.geomspace(0.002, 5.0, 11).tolist()),
         (0.0, 0.002, 0.011, 0.006, 0.0, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0),
@@ -288,7 +199,8 @@ def sample(
     d = Diagnosis(
         FORMAT, fibres, "3state_coop", "gaussian", False, 1, 81.2, verdict, mechanisms, parts, explained,
         places(traces, rows, "before_f0"), 0.002, True,
-        Remaining(after.train_rmsd_f0, NOISE_F0, places(traces, rows, "after_f0"), law), law, before, after,
+        Remaining(after.train_rmsd_f0, NOISE_F0, places(traces, rows, "after_f0"), left if effects else law),
+        law, before, after,
         gain_of(traces, ""), 0.7 * (after.heldout_rmsd_f0 or 0.0), tuple(sets),
         study_rows(traces, effects, fibres), rows, tuple(nuisances),
         features=(
@@ -352,46 +264,3 @@ ALL = {
     "one_fibre": one_fibre, "five_fibres": five_fibres, "nothing": nothing, "unexplained": unexplained,
     "ambiguous": ambiguous, "measurement": measurement,
 }  # fmt: skip
-
-
-def many(fibres: int, trials: int, phases: int, parts: int, long: bool = False) -> Sample:
-    """As many of everything as asked for, with short or with long names."""
-    random = np.random.default_rng(fibres + trials)
-    first = one_fibre()
-    d, like = first.diagnosis, first.traces[0]
-    names = tuple(("a_muscle_of_some_animal_" if long else "") + f"18Dec2017{k}" for k in range(fibres))
-    kinds = [("of_the_long_and_winding_" if long else "") + f"phase_{k}" for k in range(phases)]
-    rows, traces = [], []
-    maps: list[dict[str, Any]] = [{}, {}]
-    components_ = []
-    for k in range(parts):
-        likeliest = d.components[k % len(d.components)]
-        known = d.components[k % 3]
-        members = ("static_calcium_stiffness", "thin_filament_cooperativity") if long else likeliest.members
-        value = max(0.99 - 0.9 * k / parts, 0.0)
-        of = tuple(OfFibre(f, float(random.uniform()), 0.1, known.heldout_gain, ()) for f in names)
-        components_.append(
-            replace(likeliest, name=f"part_{k}", members=members, inclusion_probability=value, by_fibre=of,
-                    heldout_gain=known.heldout_gain)
-        )  # fmt: skip
-    for fibre in names:
-        sizes = 0.05 * random.normal(size=(trials, phases))
-        for i in range(trials):
-            trial = f"{fibre}_amp383_trial_{i:02d}" + ("_of_very_many_of_the_same_kind" if long else "")
-            before = float(random.uniform(0.01, 0.06))
-            rows.append(
-                OfTrial(fibre, trial, 4.5 + 0.25 * (i % 9), PHASES, 0.001, "window", 99, before, 0.6 * before, before,
-                        float(random.uniform(0.5, 1.2)) * before)
-            )  # fmt: skip
-            shown = {c.name: like.after_f0 - 0.01 * random.normal() for c in components_[:7]}
-            traces.append(replace(like, fibre=fibre, trial=trial, without_f0=shown))
-        listed = [rows[-trials + i].trial for i in range(trials)]
-        for maps_of, scale in zip(maps, (1.0, 0.4), strict=True):
-            table = {"trials": listed, "phases": kinds, "rms_f0": (1.2 * scale * np.abs(sizes)).tolist()}
-            maps_of[fibre] = {**table, "mean_f0": (scale * sizes).tolist(), "counts": (sizes > 0.05).tolist()}
-    study = tuple(replace(d.by_fibre[0], fibre=f, left_out_rmsd_f0=(0.03, 0.02) if fibres > 1 else None) for f in names)
-    made_of = replace(
-        d, fibres=names, components=tuple(components_), trials=tuple(rows), by_fibre=study, map_before=maps[0],
-        map_after=maps[1],
-    )  # fmt: skip
-    return Sample(made_of, tuple(traces))

@@ -12,7 +12,8 @@ from xml.etree import ElementTree
 import pytest
 from generated_diagnoses import diagnoses
 from hypothesis import given, settings
-from sample_diagnoses import ALL, Sample, many, one_fibre
+from many_of_everything import many
+from sample_diagnoses import ALL, Sample, one_fibre
 
 from xb_muscle_ros.diagnose.report import html, prose
 from xb_muscle_ros.diagnose.report.glossary import GLOSSARY, how
@@ -153,6 +154,19 @@ def test_numbers_of_the_record_stand_on_the_page() -> None:
                  "forcible detachment + viscous drag + force drift 0.52", "f 95.0 103 1/s", "augmented/18Dec2017a.yaml",
                  "time constant of 11.8 ms, scales with activation"):  # fmt: skip
         assert told in words, told
+
+
+def test_where_the_answer_is_the_base_nothing_is_told_twice() -> None:
+    text = plain(walked(page("unexplained")).text)
+    assert " → " not in text
+    assert "Nothing is added, so the places are those above." in text
+    assert " → " in walked(page("one_fibre")).text
+
+
+def test_ordinary_errors_are_in_two_digits_and_short_times_in_ms() -> None:
+    text = plain(walked(page("one_fibre")).text)
+    assert "time shift whole study 0.41 ± 0.12 ms ± 0.70 ms" in text
+    assert "pCa shift pCa 6.1 −0.030 ± 0.012 ± 0.050" in text
 
 
 def test_long_tables_say_what_they_leave_out() -> None:

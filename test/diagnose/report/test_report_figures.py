@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from layout_of_figures import boxes, outside, touching
-from sample_diagnoses import ALL, Sample, five_fibres, many, nothing, one_fibre
+from many_of_everything import many
+from sample_diagnoses import ALL, Sample, five_fibres, nothing, one_fibre, unexplained
 
 from xb_muscle_ros.diagnose.report.figures import before_after, fibres, laws, parts, probabilities, remains
 from xb_muscle_ros.diagnose.report.figures.common import Figure, trial_labels
@@ -88,6 +89,17 @@ def test_without_held_out_trials_fitted_ones_are_shown_and_said(drawn: list[Any]
     assert shown is not None
     assert "predicted by fits that did not see their condition" in shown.caption
     assert "Held-out force RMSD (% F$_0$)" in drawn[1][2]
+
+
+def test_where_the_answer_is_the_base_one_model_is_shown_and_that_is_said(drawn: list[Any]) -> None:
+    figures = draw_all(unexplained())
+    written = {text for _, _, texts, _ in drawn for text in texts}
+    assert "base model" in written
+    assert "answer" not in written
+    for name in ("before_after", "parts"):
+        figure = figures[name]
+        assert figure is not None
+        assert "to which the answer adds nothing" in figure.caption
 
 
 def test_telling_trials_are_the_best_the_median_and_the_worst() -> None:

@@ -17,14 +17,14 @@ from xb_muscle_ros.diagnose.noise.cells import Residual
 from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.diagnose.noise.significance import significance
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.scores.noise.model import NoiseModel, Source
+from xb_muscle_ros.scores.noise.model import LEAST_SD_F0, NoiseModel, Source
 from xb_muscle_ros.scores.noise.trials import by_windows, completed, noise_of
 from xb_muscle_ros.scores.noise.windows import Window
 from xb_muscle_ros.scores.steady import steady_part
 from xb_muscle_ros.trials.readers.assembly import trial_of
 from xb_muscle_ros.trials.readers.mapping import load_mapping
 from xb_muscle_ros.trials.readers.settings import ImportSettings
-from xb_muscle_ros.trials.trial import Phase, Trial
+from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
 
 Array = npt.NDArray[np.float64]
 Windows = Callable[..., list[Window]]
@@ -309,3 +309,36 @@ def thinned(trial: Trial, stride: int, offset: int, rest_s: float) -> Trial:
         force_time_s=trial.force_time_s[kept],
         force_n=trial.force_n[kept],
     )
+
+
+@settings(max_examples=25)
+@given(
+    st.lists(
+        st.tuples(st.integers(10, 60), st.floats(5e-4, 5e-2), st.booleans(), st.booleans()), min_size=1, max_size=4
+    ),
+    st.floats(0.0, 1e-2),
+    st.integers(0, 1000),
+)
+def test_ten_samples_are_enough_for_a_noise_of_some_size(
+    shapes: list[tuple[int, float, bool, bool]], sd: float, seed: int
+) -> None:
+    """Short, coarse, uneven, without phases, without noise: there is a size, a source and something to draw from."""
+    random = np.random.default_rng(seed)
+    trials = []
+    for k, (n, step_s, even, told) in enumerate(shapes):
+        times = np.cumsum(np.full(n, step_s) if even else step_s * random.uniform(0.2, 3.0, n))
+        onset_s, end_s = times[n // 3], times[2 * n // 3]
+        length = 1.0 + np.interp(times, [onset_s, end_s], [0.0, 0.04])
+        force = 0.3 + 8.0 * (length - 1.0) + sd * random.standard_normal(n)
+        phases = (Phase("isometric", times[0], onset_s), Phase("test_stretch", onset_s, end_s))
+        phases = (*phases, Phase("hold", end_s, times[-1])) if told else ()
+        facts = TrialFacts("made", f"t{k}", 6.0, phases=phases)
+        trials.append(Trial(facts, times, length, times[:1], np.ones(1), times, force))
+    model = noise_of(trials)
+    assert [noise.trial for noise in model.trials] == [trial.facts.trial for trial in trials]
+    for noise in model.trials:
+        assert np.isfinite(noise.sd_f0)
+        assert noise.sd_f0 >= LEAST_SD_F0
+        assert noise.source in Source
+    drawn = model.draw([trial.force_time_s for trial in trials], 3, random)
+    assert np.all(np.isfinite(drawn))

@@ -60,7 +60,7 @@ class Judged:
     def probability(self, group: Sequence[Name], fibre: int | None = None) -> float:
         """Inclusion probability of a component, by all fibres or by one."""
         averages = self.averages if fibre is None else self.of_fibres[fibre]
-        return calibrated(averages.log_odds(group))
+        return calibrated(averages.log_odds(group), averages.contribution_f0(group))
 
     @property
     def chosen(self) -> Names:

@@ -59,6 +59,16 @@ class Averaged:
             return -math.inf if not np.any(here) else math.inf
         return float(np.logaddexp.reduce(self.log_evidence[here]) - np.logaddexp.reduce(self.log_evidence[~here]))
 
+    def contribution_f0(self, names: Collection[Name]) -> float:
+        """Root of what the best set with some of these names takes off the mean square of the best set without, F0."""
+        wanted = set(names)
+        here = np.array([bool(wanted & set(s)) for s in self.sets])
+        if not np.any(here) or np.all(here):
+            return 0.0
+        best = [int(np.argmax(np.where(chosen, self.log_evidence, -np.inf))) for chosen in (here, ~here)]
+        with_it, without = (float(self.mean_square_f0[k]) for k in best)
+        return math.sqrt(max(without - with_it, 0.0))
+
     def rivals(self, name: Name, others: Sequence[Name]) -> list[Name]:
         """Names that take its place in other sets."""
         own = self.including([name])

@@ -9,15 +9,25 @@ from __future__ import annotations
 
 import math
 
-# Fitted by `scripts/calibrate_diagnosis.py` to open composites: log-odds = OFFSET + SLOPE * (log-odds of averaging).
-OFFSET, SLOPE = 0.0, 1.0
+# Log-odds = OFFSET + SLOPE (log-odds of averaging) + SIZE log(contribution / PRACTICAL_F0).
+OFFSET, SLOPE, SIZE = 0.0, 0.6, 1.5
+PRACTICAL_F0 = 0.003
+"""A contribution below it is of no use to anyone, F0."""
+# Contributions are counted within these factors of it: a large one is no evidence of its own.
+_LEAST, _LARGEST = 0.1, 1.0
 # Beyond this nothing was ever seen to be surer.
 _MOST = 7.0
 
 
-def calibrated(log_odds: float) -> float:
-    """Probability that something is part of the truth, from its log-odds by averaging over sets."""
+def calibrated(log_odds: float, contribution_f0: float) -> float:
+    """Probability that something is part of the truth.
+
+    Args:
+        log_odds: by averaging over sets.
+        contribution_f0: root of what it takes off the mean square of the best set without it, F0.
+    """
     if math.isinf(log_odds) and log_odds < 0.0:
         return 0.0
-    worth = OFFSET + SLOPE * min(max(log_odds, -50.0), 50.0)
+    size = min(max(contribution_f0 / PRACTICAL_F0, _LEAST), _LARGEST)
+    worth = OFFSET + SLOPE * min(max(log_odds, -50.0), 50.0) + SIZE * math.log(size)
     return 1.0 / (1.0 + math.exp(-min(max(worth, -_MOST), _MOST)))

@@ -18,7 +18,7 @@ from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.result import HeldOutGain
 from xb_muscle_ros.diagnose.search.descent import Fit
 from xb_muscle_ros.diagnose.search.explore import Explorer, fitted
-from xb_muscle_ros.diagnose.search.system import Names, System
+from xb_muscle_ros.diagnose.search.system import SATURATING, Names, System
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.calibration import calibrated_force
 from xb_muscle_ros.fit.correction import Correction
@@ -37,13 +37,14 @@ LEAST_F0 = 5e-4
 def folds_of(trials: Sequence[FitTrial], most: int) -> list[frozenset[str]]:
     """Trials that are left out together: whole solutions where each has trials enough, else trials spread over them.
 
-    Empty where there are fewer than three trials.
+    The solution that defines F0 stays in every fit then: without it nobody knows what force is measured in. Empty where
+    there are fewer than three trials.
     """
     if len(trials) < 3:
         return []
     count = Counter(t.solution for t in trials)
     if len(count) >= 3 and min(count.values()) >= 2:
-        groups = [frozenset(t.name for t in trials if t.solution == s) for s in count]
+        groups = [frozenset(t.name for t in trials if t.solution == s) for s in count if s != SATURATING]
         if len(groups) <= most:
             return groups
     order = sorted(range(len(trials)), key=lambda i: (float(trials[i].calcium_um[0]), i))
@@ -77,7 +78,7 @@ def predicted(system: System, fit: Fit, trial: FitTrial, closure_f0: Array | Non
     size = len(problem.coordinates)
     correction = None
     if closure_f0 is not None:
-        correction = Correction(np.zeros(size), {trial.name: closure_f0}, {}, np.empty(0), np.empty((0, size)))
+        correction = Correction.level(np.zeros(size), {trial.name: closure_f0}, np.zeros(len(problem.features)))
     problem = replace(problem, correction=correction)
     return calibrated_force(problem, problem.start, trial).force_f0
 

@@ -12,6 +12,7 @@ from xb_muscle_ros.diagnose.search.descent import Descent
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.searching import Searched
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.correction import Correction
 
 
 def left_out(study: Searched, chosen: Names) -> list[tuple[float, float] | None]:
@@ -40,7 +41,9 @@ def left_out(study: Searched, chosen: Names) -> list[tuple[float, float] | None]
         free = [j for j, c in enumerate(made.coordinates) if c.label not in common]
         fixed = replace(made.fibre, values={**made.fibre.values, **common})
         size = len(free)
-        correction = made.correction and replace(made.correction, at=np.zeros(size), feature_slopes=np.empty((0, size)))
+        correction = made.correction and Correction.level(
+            np.zeros(size), made.correction.force, made.correction.features
+        )
         held = replace(made, fibre=fixed, coordinates=tuple(made.coordinates[j] for j in free), correction=correction)
         try:
             descent = Descent(system, held)
@@ -53,7 +56,7 @@ def left_out(study: Searched, chosen: Names) -> list[tuple[float, float] | None]
             held,
             trials=recorded.trials,
             correction=full.correction
-            and replace(full.correction, at=np.zeros(size), feature_slopes=np.empty((0, size))),
+            and Correction.level(np.zeros(size), full.correction.force, full.correction.features),
         )
         try:
             forces = again.predicted(point.z)

@@ -23,7 +23,9 @@ from xb_muscle_ros.diagnose.words import digits, family_words, human, joined, me
 _HERE = "xb_muscle_ros.diagnose.report"
 _UNITS = re.compile(r"\b([FL])0\b")
 # A number does not part from its unit or its sign.
-_TIED = re.compile(r"(?<=\d) (?=%|ms\b|s\b)|(?<=%) (?=[FL]0)|(?<=[<>±]) (?=\d)|(?<=&[lg]t;) (?=\d)")
+_TIED = re.compile(
+    r"(?<=\d) (?=%|ms\b|s\b)|(?<=%) (?=[FL]0)|(?<=[<>±]) (?=\d)|(?<=&[lg]t;) (?=\d)|(?<=,) (?=−?[\d.]+\])"
+)
 MOST_ROWS = 40
 """Rows of a table of trials, errors or places; the rest is in `diagnosis.json`, and said to be."""
 # Candidates below this probability are listed in one line.
@@ -80,7 +82,7 @@ def _environment() -> jinja2.Environment:
     made.filters.update(
         f0=lambda value: say.force(value, ""), prob=say.probability, share=say.share, gain=say.gain, num=say.number,
         estimate=say.estimate, title=say.title, human=human, meaning=meaning, family=family_words, phase=phase_words,
-        units=_units, joined=joined, signed=_signed, p=_p_value,
+        units=_units, joined=joined, signed=_signed, p=_p_value, rounded=say.rounded, error=say.error,
     )  # fmt: skip
     return made
 
@@ -102,6 +104,7 @@ def _context(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Any]:
         "named": NAMED,
         "most": MOST_ROWS,
         "several": len(d.fibres) > 1,
+        "changed": say.changed(d),
     }
 
 

@@ -11,6 +11,7 @@ from xb_muscle_ros.diagnose.result import (
     Diagnosis,
     HeldOutGain,
     Kind,
+    Nuisance,
     Parameter,
     Place,
 )
@@ -84,6 +85,19 @@ def number(value: float, unit: str | None = None) -> str:
     return quantity(value, unit).replace("-", _MINUS, 1) if math.isfinite(value) else NOTHING
 
 
+def rounded(value: float, significant: int = 2) -> str:
+    """A number of so many digits, without unit."""
+    return digits(value, significant).replace("-", _MINUS, 1) if math.isfinite(value) else NOTHING
+
+
+def error(n: Nuisance) -> tuple[str, str]:
+    """An ordinary error with its standard error, and what is ordinary; short times in ms."""
+    scale, unit = (1e3, "ms") if n.unit == "s" and abs(n.prior_sd) < 0.1 else (1.0, n.unit)
+    told = "" if unit in ("", "1") else f" {unit}"
+    sd = "" if n.sd is None else f" ± {rounded(scale * n.sd)}"
+    return f"{rounded(scale * n.value)}{sd}{told}", f"± {rounded(scale * n.prior_sd)}{told}"
+
+
 def estimate(p: Parameter) -> str:
     """Value, unit and interval, in one line."""
     if not math.isfinite(p.value):
@@ -122,6 +136,11 @@ def artefacts(components: Iterable[Component]) -> list[Component]:
 def alone(c: Component) -> tuple[int, int]:
     """In how many fibres a component has a probability of `NAMED` by that fibre alone, and of how many."""
     return sum(row.inclusion_probability >= NAMED for row in c.by_fibre), len(c.by_fibre)
+
+
+def changed(d: Diagnosis) -> bool:
+    """Whether the answer is another model than the base; where it is not, only one is shown."""
+    return d.after.names != d.before.names or d.after.train_rmsd_f0 != d.before.train_rmsd_f0
 
 
 def fibres(d: Diagnosis) -> str:

@@ -38,7 +38,7 @@ class Fit:
         names: of the set.
         values: of all coordinates by label, in their units.
         mean_square_f0: of the residuals, weighted, F0².
-        prior: half the squared distance from the priors, in standard deviations.
+        prior: half the squared distance from the priors and from features, in standard deviations.
         occam: half the logarithm of how many times narrower the posterior is than the priors (Laplace).
         sds: posterior standard deviation of every coordinate by label, on the moved scale (logarithms where fitted so).
         rmsd_f0: root of `mean_square_f0`, F0.
@@ -93,13 +93,19 @@ class Point:
         z: on the moved scale.
         residual: simulated less measured force, F0.
         mean_square: weighted, F0².
-        prior: distance from the priors, in standard deviations.
+        prior, feature: distances from the priors and from the features, in standard deviations.
     """
 
     z: Array
     residual: Array
     mean_square: float
     prior: Array
+    feature: Array
+
+    @property
+    def pulled(self) -> float:
+        """Half the squared distances."""
+        return 0.5 * float(self.prior @ self.prior + self.feature @ self.feature)
 
 
 class Descent:
@@ -120,6 +126,8 @@ class Descent:
         logs = np.array([c.log for c in problem.coordinates], dtype=bool)
         self.longest = np.where(logs, _LONGEST_LOG, np.where(np.isfinite(sds), _LONGEST_SD * sds, np.inf))
         self.simulated = 0.0
+        # Slopes of the features where the last ones of the force were taken.
+        self.of_features = np.zeros((len(self.training.features), len(problem.coordinates)))
         self.moving = np.array([c.group is None or not c.group for c in problem.coordinates])
 
     def at(self, z: Array) -> Point:
@@ -133,16 +141,17 @@ class Descent:
         if not np.all(np.isfinite(residual)):
             raise UserError(f"fibre {self.system.fibre.name}: the simulated force is not finite; start elsewhere")
         mean_square = float(self.system.weights @ residual**2) / self.total
-        return Point(z, residual, mean_square, self.problem.prior(z))
+        return Point(z, residual, mean_square, self.problem.prior(z), self.training.feature_distance(z))
 
     def cost(self, point: Point) -> float:
         """See the module."""
         floor = self.system.noise_f0
-        return 0.5 * self.told * float(np.log(floor**2 + point.mean_square)) + 0.5 * float(point.prior @ point.prior)
+        return 0.5 * self.told * float(np.log(floor**2 + point.mean_square)) + point.pulled
 
     def slopes(self, point: Point) -> Array:
         """Of the recorded force by the coordinates, shape (samples, coordinates), F0."""
-        found, _ = self.training.slopes(point.z)
+        found, features = self.training.slopes(point.z)
+        self.of_features = np.nan_to_num(features, nan=0.0, posinf=0.0, neginf=0.0)
         self.simulated += float(np.count_nonzero([c.group is None for c in self.problem.coordinates]))
         return np.nan_to_num(found, nan=0.0, posinf=0.0, neginf=0.0)
 
@@ -150,9 +159,10 @@ class Descent:
         """Curvature and gradient of the cost at the scale that the residuals have."""
         scale = self.told / self.total / (self.system.noise_f0**2 + point.mean_square)
         weighted = slopes * (scale * self.system.weights)[:, None]
-        curvature = weighted.T @ slopes + np.diag(self.information)
+        curvature = weighted.T @ slopes + np.diag(self.information) + self.of_features.T @ self.of_features
         means = np.array([c.prior_mean for c in self.problem.coordinates])
         gradient = weighted.T @ point.residual + self.information * (point.z - means)
+        gradient += self.of_features.T @ point.feature
         return curvature, gradient
 
     def walk(self, z: Array, most: int, tolerance: float, slopes: Array | None = None) -> tuple[Point, Array]:
@@ -223,13 +233,16 @@ class Descent:
     def fit(self, names: Names, point: Point, slopes: Array) -> Fit:
         """The record of a point with the slopes there."""
         values = {c.label: c.outward(float(z)) for c, z in zip(self.problem.coordinates, point.z, strict=True)}
-        prior = 0.5 * float(point.prior @ point.prior)
         curvature, _ = self.normal(point, slopes)
         known = self.information > 0.0
         widths = self.information[known] ** -0.5
         _, twice = np.linalg.slogdet(curvature[np.ix_(known, known)] * widths * widths[:, None])
-        sds = np.sqrt(np.maximum(np.diag(np.linalg.pinv(curvature)), 0.0))
+        # Where rounding hides what the data tell of a coordinate, they tell nothing.
+        variances = np.diag(np.linalg.pinv(curvature))
+        priors = np.where(known, np.maximum(self.information, 1e-300) ** -0.5, np.inf)
+        sds = np.where(variances > 0.0, np.sqrt(np.maximum(variances, 0.0)), priors)
+        sds = np.minimum(sds, priors)
         by_label = {c.label: float(sd) for c, sd in zip(self.problem.coordinates, sds, strict=True)}
         return Fit(
-            ordered(names), values, point.mean_square, prior, 0.5 * float(twice), by_label, round(self.simulated)
+            ordered(names), values, point.mean_square, point.pulled, 0.5 * float(twice), by_label, round(self.simulated)
         )

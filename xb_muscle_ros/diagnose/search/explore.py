@@ -13,6 +13,7 @@ from xb_muscle_ros.diagnose.inference.population import Estimate, adjustment
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search.descent import Descent, Fit
 from xb_muscle_ros.diagnose.search.promise import Linear, Promise, promise
+from xb_muscle_ros.diagnose.search.starts import spread, starts_of
 from xb_muscle_ros.diagnose.search.system import Names, System, label, ordered
 from xb_muscle_ros.diagnose.search.whole import beside
 from xb_muscle_ros.errors import UserError
@@ -27,6 +28,8 @@ _PRIOR_ODDS = {True: np.log(0.1), False: np.log(0.05)}
 _WORTH = 0.5
 # Form errors of mechanisms: share of what a mechanism does that its form here gets wrong.
 FORM = 0.12
+# Of a set whose curvature cannot be told.
+_NONE = -1e9
 
 
 @dataclass(frozen=True)
@@ -140,7 +143,8 @@ class Explorer:
         chosen = range(len(self.systems)) if fibre is None else [fibre]
         fits = self.fits[names]
         own = [self._cost(self.systems[i], fits[i], self.floors_f0[i]) for i in chosen]
-        return self.odds(names) + self.adjusted(names, fibre) - float(sum(own))
+        found = self.odds(names) + self.adjusted(names, fibre) - float(sum(own))
+        return found if np.isfinite(found) else _NONE
 
     def estimates(self, names: Names) -> dict[str, list[Estimate]]:
         """Coordinates of the mechanisms of a set in every fibre, by label."""
@@ -200,7 +204,9 @@ class Explorer:
                 found[name] = [promise(one, name) for one in linear]
             except (UserError, np.linalg.LinAlgError):
                 continue
-            self.promised[ordered((*names, name))] = tuple(p.mean_square_f0 for p in found[name])
+            squares = tuple(p.mean_square_f0 for p in found[name])
+            if np.all(np.isfinite(squares)):
+                self.promised[ordered((*names, name))] = squares
         return found
 
     def step(self, names: Names, count: int, blind: bool) -> list[Names]:
@@ -227,7 +233,7 @@ class Explorer:
             UserError: the model has no solution in some fibre.
         """
         if () not in self.fits:
-            self.fit([((), [[{}, *_spread(s)] for s in self.systems])], "base")
+            self.fit([((), [[{}, *spread(s)] for s in self.systems])], "base")
         if () not in self.fits:
             names = ", ".join(s.fibre.name for s in self.systems)
             raise UserError(
@@ -287,19 +293,3 @@ class Explorer:
             if rest in self.fits:
                 self.step(rest, self.effort.rivals, blind=len(names) <= 1)
         self.step(names, self.effort.rivals, blind=False)
-
-
-def starts_of(systems: Sequence[System], name: Name) -> list[list[dict[str, float]]]:
-    """Starts of a mechanism from the fibre file's own parameters."""
-    return [[dict(s) for s in CATALOGUE[name.value].starting_values(system.fibre.values)] for system in systems]
-
-
-def _spread(system: System) -> list[dict[str, float]]:
-    """Further points to start the base from: more and less cooperativity, faster and slower heads."""
-    values = system.fibre.values
-    found: list[dict[str, float]] = []
-    for factors in ({"koop": 3.0, "kon": 0.6}, {"koop": 0.4, "kon": 1.4}, {"f": 0.7, "k11": 0.5}):
-        start = {name: values[name] * factor for name, factor in factors.items() if values.get(name, 0.0) > 0.0}
-        if start and start not in found:
-            found.append(start)
-    return found

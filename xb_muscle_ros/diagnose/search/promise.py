@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 
 # A mechanism's line is followed this far either way, in units of its start, where the fit begins.
 _LEAST_SHARE, _MOST_SHARE = 0.1, 8.0
-BLIND = (*FRAMES, Name.THICK_FILAMENT_COOPERATIVITY)
+BLIND = tuple(n for n in (*FRAMES, Name.THICK_FILAMENT_COOPERATIVITY) if n is not Name.HALF_SARCOMERE_SPREAD)
 """Mechanisms that only a fit can tell: no line leads from their absence to them."""
 
 
@@ -81,6 +81,10 @@ class Linear:
         distance = self.point.z - np.array([c.prior_mean for c in d.problem.coordinates])
         pull = np.concatenate([((d.information if own is None else own) * distance)[free], gradient])
         curvature = (joint * weights[:, None]).T @ joint + np.diag(prior)
+        of_features = d.of_features[:, free]
+        own_size = of_features.shape[1]
+        curvature[:own_size, :own_size] += of_features.T @ of_features
+        pull[:own_size] += of_features.T @ self.point.feature
         lead = np.sqrt(np.maximum(np.diag(curvature), 1e-300))
         right = -((joint * weights[:, None]).T @ self.point.residual + pull)
         move = np.linalg.solve(curvature / lead / lead[:, None] + 1e-9 * np.eye(lead.size), right / lead) / lead

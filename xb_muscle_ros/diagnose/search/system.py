@@ -15,6 +15,7 @@ from xb_muscle_ros.diagnose.search.whole import _SWITCHED, frame_of, whole
 from xb_muscle_ros.fit.coordinates import Coordinate, fault_coordinates, mechanism_coordinates, parameter_coordinates
 from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.data import FitTrial
+from xb_muscle_ros.fit.features import F0_ANCHOR, Feature
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
 from xb_muscle_ros.models.catalogue import CATALOGUE, Entry
@@ -23,6 +24,8 @@ from xb_muscle_ros.models.fibre_file import Fibre
 Array = npt.NDArray[np.float64]
 Names = tuple[Name, ...]
 
+SATURATING = f"pCa {F0_ANCHOR.pca:g}"
+"""Solution whose isometric force is F0."""
 BEYOND = 6.0
 """An artefact that is named may be so much larger than an ordinary one."""
 
@@ -47,6 +50,7 @@ class System:
         weights: of the samples of all trials, one below the other, shape (n,): independent residuals each stands for.
         noise_f0: standard deviation that a residual has at least, noise and numerics, F0.
         closure_f0: what the Gaussian form leaves out of the distribution's force at the thinned times, by trial.
+        features: isometric forces and SRS to be met beside the traces.
     """
 
     fibre: Fibre
@@ -54,6 +58,7 @@ class System:
     weights: Array
     noise_f0: float
     closure_f0: Mapping[str, Array] = field(default_factory=dict)
+    features: tuple[Feature, ...] = ()
 
     @staticmethod
     def of(fibre: Fibre, trials: Sequence[FitTrial], noise_f0: float) -> System:
@@ -72,7 +77,12 @@ class System:
         sizes = [t.measured_f0.size for t in self.trials]
         keep = np.repeat([t.name not in held_out for t in self.trials], sizes)
         kept = tuple(t for t in self.trials if t.name not in held_out)
-        return replace(self, trials=kept, weights=self.weights[keep])
+        made = replace(self, trials=kept, weights=self.weights[keep])
+        # Forces are in units of the isometric force at saturating calcium, which holds though nobody shows it.
+        saturating = [t for t in self.trials if t.solution == SATURATING]
+        if saturating and not any(t.solution == SATURATING for t in kept):
+            made = replace(made, features=(*self.features, F0_ANCHOR))
+        return made
 
     def problem(self, names: Collection[Name], values: Mapping[str, float]) -> Problem:
         """The fit of a set.
@@ -100,8 +110,14 @@ class System:
         merged = tuple(_started(c, values, present) for c in {c.label: c for c in coordinates}.values())
         correction = None
         if self.closure_f0:
-            correction = Correction(np.zeros(len(merged)), self.closure_f0, {}, np.empty(0), np.empty((0, len(merged))))
-        return Problem(fibre, self.trials, merged, {}, correction=correction)
+            correction = Correction(
+                np.zeros(len(merged)),
+                self.closure_f0,
+                {},
+                np.zeros(len(self.features)),
+                np.zeros((len(self.features), len(merged))),
+            )
+        return Problem(fibre, self.trials, merged, {}, self.features, correction)
 
     def _artefacts(self, names: Names) -> list[Coordinate]:
         """Ordinary measurement errors, wider where named, and those that are in a set only."""
@@ -114,7 +130,7 @@ class System:
     def to_json(self) -> dict[str, Any]:
         """Plain data, so that a worker elsewhere can have it."""
         return {
-            "problem": Problem(self.fibre, self.trials, (), {}).to_json(),
+            "problem": Problem(self.fibre, self.trials, (), {}, self.features).to_json(),
             "weights": self.weights.tolist(),
             "noise_f0": self.noise_f0,
             "closure_f0": {name: values.tolist() for name, values in self.closure_f0.items()},
@@ -125,7 +141,8 @@ class System:
         """A system from plain data."""
         problem = Problem.from_json(row["problem"])
         closure = {name: np.array(values, dtype=np.float64) for name, values in row["closure_f0"].items()}
-        return System(problem.fibre, problem.trials, np.array(row["weights"]), row["noise_f0"], closure)
+        weights = np.array(row["weights"])
+        return System(problem.fibre, problem.trials, weights, row["noise_f0"], closure, problem.features)
 
 
 def _usual(parameter: str) -> float:

@@ -20,7 +20,7 @@ from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.parameters import complete
 from xb_muscle_ros.models.registry import compose, model_of_set, row_of, with_mechanisms
 
-FRAMES = (Name.THIN_FILAMENT_COOPERATIVITY, Name.SERIES_COMPLIANCE)
+FRAMES = (Name.THIN_FILAMENT_COOPERATIVITY, Name.SERIES_COMPLIANCE, Name.HALF_SARCOMERE_SPREAD)
 """Mechanisms that are another model rather than a value."""
 _SWITCHED: Mapping[Name, Mapping[str, float]] = {Name.THICK_FILAMENT_COOPERATIVITY: {"J2": 0.0}}
 
@@ -33,7 +33,7 @@ def absent(name: Name) -> dict[str, float]:
 
 def beside(fibre: Fibre) -> tuple[Name, ...]:
     """Mechanisms that go beside a fibre's model, those of `FRAMES` among them."""
-    return tuple(n for n in MECHANISMS if n is not Name.HALF_SARCOMERE_SPREAD and _goes(fibre.model, (n,)))
+    return tuple(name for name in MECHANISMS if _goes(fibre.model, (name,)))
 
 
 @functools.cache
@@ -62,7 +62,7 @@ def whole(fibre: Fibre, frame: Sequence[Name]) -> Fibre:
     """
     named = [*frame]
     for name in MECHANISMS:
-        if name not in FRAMES and name is not Name.HALF_SARCOMERE_SPREAD and _goes(fibre.model, (*named, name)):
+        if name not in FRAMES and _goes(fibre.model, (*named, name)):
             named.append(name)
     model = with_mechanisms(fibre.model, *(n.value for n in named))
     needed = {row.name for row in compose(model, fibre.method).parameters}

@@ -46,6 +46,23 @@ def power_law_relaxation(length: Array, stiffness: float, exponent: float, steep
     return stiffness * total
 
 
+def slipping_friction(length: Array, way: float, unevenness: float, release_s: float) -> Array:
+    """Springs that each hold up to their own way and slip beyond (Iwan 1966), over their sum's largest force; (n,).
+
+    Args:
+        way: at which the middle one slips, L0.
+        unevenness: SD of the ways' logarithms.
+        release_s: time constant with which held springs let go.
+    """
+    ways = way * np.exp(unevenness * np.array([-1.4, -0.5, 0.0, 0.5, 1.4]))
+    moved = np.diff(length, prepend=length[0])
+    left, held, total = np.exp(-SAMPLE_S / release_s), np.zeros(ways.size), np.zeros(length.size)
+    for k in range(length.size):
+        held = np.clip(left * held + moved[k] / ways, -1.0, 1.0)
+        total[k] = np.mean(held)
+    return total
+
+
 def calcium_share(calcium_um: float, half_pca: float, steepness: float) -> float:
     """Share of sites on titin that calcium occupies."""
     return float(1.0 / (1.0 + (10.0 ** (6.0 - half_pca) / calcium_um) ** steepness))

@@ -129,6 +129,22 @@ def _recruited(truth: Truth, scale: float, shape: Shape) -> Truth:
     return truth.acting(act)
 
 
+def _slipping(truth: Truth, scale: float, shape: Shape) -> Truth:
+    return truth.adding(
+        lambda s, answer: (
+            scale
+            * answer.bound
+            * beside.slipping_friction(s.length, shape["way"], shape["unevenness"], shape["release_s"])
+        )
+    )
+
+
+def _persistent(truth: Truth, scale: float, shape: Shape) -> Truth:
+    # Going to rest is slowed a little more or less than waking.
+    values = {**_USUAL, **truth.world.values}
+    return truth.changed({At.J1: values["J1"] * np.exp(-scale), At.J2: values["J2"] * np.exp(-scale * shape["uneven"])})
+
+
 def _draw_spread(random: np.random.Generator) -> Shape:
     count = int(random.integers(3, 6))
     z = random.standard_normal(count)
@@ -230,6 +246,10 @@ _ROWS = (
         _set(At.WEAK_STIFFNESS, rate=At.WEAK_RATE, strain=At.WEAK_STRAIN, lag=At.WEAK_LAG),
     ),
     Effect(
+        Name.FILAMENT_FRICTION.value, "friction if all heads were bound, F0", _ALL, 0.2, 1.5,
+        _between(way=(0.004, 0.02), unevenness=(0.1, 0.5), release_s=(0.02, 0.5)), _slipping,
+    ),
+    Effect(
         Name.ACTIVE_TITIN.value, "stiffness when bound, F0/L0", _ALL, 2.0, 20.0,
         _between(contour=(0.12, 0.25), rebind_s=(0.03, 0.3), **_TITIN), _titin,
     ),
@@ -249,6 +269,10 @@ _ROWS = (
     Effect(
         Name.STRAIN_RECRUITED_HEADS.value, "J1's factor per length, 1/L0", ("3state_coop", "3state_coop_rigid"), 100.0,
         5000.0, _between(steepness=(5.0, 25.0), delay_s=(0.003, 0.02)), _recruited,
+    ),
+    Effect(
+        Name.PERSISTENT_THICK_FILAMENT.value, "logarithm of slowing, 1", ("3state_coop", "3state_coop_rigid"), 1.5, 4.0,
+        _between(uneven=(0.85, 1.15)), _persistent,
     ),
     Effect(
         Name.FORCIBLE_DETACHMENT.value, "rate of tearing off, 1/s", ("3state_coop", "2state_coop", "3state_coop_rigid"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +13,10 @@ Array = npt.NDArray[np.float64]
 
 # Ten independent observations of 0.3 % F0 a trial, against priors of SD 1 on every coordinate.
 WORTH, WORTH_SD = 10.0, 0.003
-# Simulations of a refit at most, the relative gain that is one, and how many without it end it.
-_MODELS, _GAIN, _IDLE = 24, 0.03, 3
+# Simulations between two takings of slopes at most, the relative gain that is one, and how many without it end them.
+_MODELS, _GAIN, _IDLE = 18, 0.05, 4
+# What slopes taken anew are to gain, or else it was the last time; twice they are taken anyway.
+_WORTHWHILE, _SURELY = 0.1, 2
 # How far one step may go in a logarithm.
 _FARTHEST = 0.7
 
@@ -39,21 +41,15 @@ class Taken(NamedTuple):
 class Rest:
     """All that may change to take up a difference: constants, other effects' scales, ordinary errors of measurement."""
 
-    def __init__(self, columns: Sequence[Array] | Array, trials: int) -> None:
+    def __init__(self, columns: Array, trials: int) -> None:
         """Take the change of all forces by one prior SD of each coordinate.
 
         Args:
-            columns: each of shape (samples of all trials,), F0; or a matrix of them.
+            columns: shape (samples of all trials, coordinates), F0.
             trials: how many there are.
         """
-        self._columns = np.column_stack(list(columns)) if not isinstance(columns, np.ndarray) else columns
+        self._columns = columns
         self._weight = np.sqrt(WORTH * trials / self._columns.shape[0]) / WORTH_SD
-
-    def without(self, i: int) -> Rest:
-        """The same but for one coordinate."""
-        made = Rest.__new__(Rest)
-        made._columns, made._weight = np.delete(self._columns, i, axis=1), self._weight
-        return made
 
     def take(self, difference: Array) -> Taken:
         """Penalised least squares of data minus model, F0, shape (samples,); NaN where these are not finite."""
@@ -65,38 +61,50 @@ class Rest:
         return Taken(difference - self._columns @ pulled, pulled)
 
     def refit(
-        self, data: Array, model: Callable[[Array], Array], slopes: Callable[[Array], Array], logarithms: int
-    ) -> Taken:
+        self, data: Array, model: Callable[[Array], Array], slopes: Callable[[Array], Array], logarithms: int,
+        anew: int,
+    ) -> Taken:  # fmt: skip
         """Fit data by damped Gauss-Newton steps whose slopes are corrected by what each step has shown (Broyden).
-
-        Where that gains no more, slopes are taken anew, once.
 
         Args:
             data: F0, shape (samples,).
             model: forces at coordinates, in SDs of their priors.
             slopes: change of all forces by each coordinate, there.
             logarithms: so many coordinates, the first, are logarithms: a step is not to go far in them.
+            anew: how often slopes may be taken anew where such steps gain no more.
         """
-        at, columns = np.zeros(self._columns.shape[1]), self._columns.copy()
-        force, damping, idle, anew = model(at), 1e-3, 0, False
+        at = np.zeros(self._columns.shape[1])
+        force, columns = model(at), self._columns
+        cost = self._cost(data - force, at)
+        for taken in range(anew + 1):
+            before = cost
+            at, force, cost = self._descend(data, model, logarithms, at, force, columns)
+            if taken == anew or (taken >= _SURELY and not cost < (1.0 - _WORTHWHILE) * before):
+                break
+            columns = slopes(at)
+        return Taken(data - force, at)
+
+    def _descend(
+        self, data: Array, model: Callable[[Array], Array], logarithms: int, at: Array, force: Array, columns: Array
+    ) -> tuple[Array, Array, float]:
+        """Steps from one taking of slopes; where they led, forces there, and their cost."""
+        columns, damping, idle = columns.copy(), 1e-3, 0
         cost = self._cost(data - force, at)
         for _ in range(_MODELS):
             step = self._step(columns, data - force, at, damping)
             step *= min(1.0, _FARTHEST / max(float(np.max(np.abs(step[:logarithms]))), 1e-12))
             found = model(at + step)
             then = self._cost(data - found, at + step)
-            if np.isfinite(then):
+            if np.isfinite(then) and np.any(step):
                 columns += np.outer(found - force - columns @ step, step) / (step @ step)
             idle = 0 if then < (1.0 - _GAIN) * cost else idle + 1
             if then < cost:
                 at, force, cost, damping = at + step, found, then, max(damping / 5.0, 1e-6)
             else:
-                damping *= 8.0
-            if idle >= _IDLE:
-                if anew:
-                    break
-                columns, damping, idle, anew = slopes(at), 1e-3, 0, True
-        return Taken(data - force, at)
+                damping *= 10.0
+            if idle > _IDLE:
+                break
+        return at, force, cost
 
     def _cost(self, left: Array, at: Array) -> float:
         return float(self._weight**2 * np.sum(left**2) + np.sum(at**2))

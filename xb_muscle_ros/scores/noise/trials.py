@@ -67,12 +67,12 @@ def noise_of(trials: Sequence[Trial]) -> NoiseModel:
             f"{LEAST_DIFFERENCES} in one trial are needed"
         )
     by_name = {t.facts.trial: t for t in trials}
-    known = {name: _at_least(noise, _scatter_f0(by_name[name])) for name, noise in known.items()}
+    known = {name: _at_least(noise, steady_scatter_f0(by_name[name])) for name, noise in known.items()}
     steps_s = {t.facts.trial: _step_s(t.force_time_s) if even[t.facts.trial] else math.nan for t in trials}
     return completed(known, steps_s, {t.facts.trial: _level_f0(t) for t in trials})
 
 
-def _scatter_f0(trial: Trial) -> float:
+def steady_scatter_f0(trial: Trial) -> float:
     """Standard deviation of steady force around a straight line, F0; 0 where too little of it is steady."""
     inside, _ = steady_part(trial, trial.force_time_s, trial.measured_f0)
     force = trial.measured_f0[inside]
@@ -154,7 +154,7 @@ def _like_others(
     level = np.log([levels_f0[other] for other in known])
     away = math.log(levels_f0[name]) - float(np.mean(level))
     power, power_sd, spread = _power_of_force(log, level)
-    mean = float(np.mean(log)) + power * away
+    mean = max(float(np.mean(log)) + power * away, math.log(LEAST_SD_F0))
     spread = math.hypot(spread, power_sd * away)
     same = [noise for noise in known.values() if alike(steps_s[noise.trial], steps_s[name])] or list(known.values())
     like = min(same, key=lambda noise: abs(math.log(noise.sd_f0) - mean))
@@ -164,7 +164,7 @@ def _like_others(
         trial=name,
         source=Source.OTHERS,
         samples=0,
-        sd_f0=math.exp(mean),
+        sd_f0=max(math.exp(mean), LEAST_SD_F0),
         freedom=like.freedom,
         likeliest=like.likeliest.times(factor),
         members=tuple(like.members[k % len(like.members)].times(float(sizes[k])) for k in range(MEMBERS)),

@@ -8,11 +8,9 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.diagnose.report.figures.common import (
-    ANSWER_DOT,
-    ANSWER_LINE,
-    BASE_DOT,
-    BASE_LINE,
     DATA_LINE,
+    DOTS,
+    LINES,
     WIDTH_MM,
     Array,
     Figure,
@@ -20,15 +18,17 @@ from xb_muscle_ros.diagnose.report.figures.common import (
     finite,
     key,
     quiet_rows,
+    shown_of,
     svg,
     thinned,
     trial_labels,
     unique,
     wrapped,
 )
-from xb_muscle_ros.diagnose.report.phrases import force
+from xb_muscle_ros.diagnose.report.phrases import changed, force
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
+from xb_muscle_ros.diagnose.words import joined
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
 _TRIALS, _ROWS = 3, 24
@@ -48,12 +48,12 @@ def errors(d: Diagnosis, t: OfTrial) -> tuple[float | None, float | None]:
 
 
 def telling(d: Diagnosis, rows: Sequence[OfTrial]) -> list[OfTrial]:
-    """Trials with the largest, the median and the least fall of the error's square."""
+    """Trials with the largest, the median and the least fall of the error's square; of the error, if none changed."""
     falls = []
     for t in rows:
         known = finite(errors(d, t))
         if len(known) == 2:
-            falls.append((known[0] ** 2 - known[1] ** 2, t))
+            falls.append((known[0] ** 2 - (known[1] ** 2 if changed(d) else 0.0), t))
     falls.sort(key=lambda pair: -pair[0])
     places = dict.fromkeys((0, len(falls) // 2, len(falls) - 1))
     return [falls[k][1] for k in places if 0 <= k < len(falls)][:_TRIALS]
@@ -66,7 +66,10 @@ def draw_before_after(d: Diagnosis, traces: Sequence[TrialTraces]) -> Figure | N
     chosen = telling(d, [t for t in rows if key(t) in of and _predicted(d, of[key(t)]) is not None])
     if not rows:
         return None
-    many = len(rows) > _ROWS
+    many, total = changed(d) and len(rows) > _ROWS, len(rows)
+    if not many:
+        largest = sorted(rows, key=lambda t: -(errors(d, t)[0] or 0.0))[:_ROWS]
+        rows = [t for t in rows if t in largest]
     bottom_mm = _SCATTER_MM if many else 18.0 + _ROW_MM * (len(rows) + 1)
     top_mm = _TOP_MM if chosen else 0.0
     with figure(WIDTH_MM, top_mm + bottom_mm) as made:
@@ -77,27 +80,32 @@ def draw_before_after(d: Diagnosis, traces: Sequence[TrialTraces]) -> Figure | N
             _scatter(parts[1], d, rows)
         else:
             _pairs(parts[1], d, rows)
-        return Figure(svg(made), _caption(d, chosen, many), "Force and its error before and after, on held-out trials")
+        left = "" if many else shown_of(len(rows), total, "trials", "those with the largest error")
+        return Figure(svg(made), _caption(d, chosen, many) + left, "Force and its error before and after")
 
 
 def _caption(d: Diagnosis, chosen: Sequence[OfTrial], many: bool) -> str:
     unseen = held_out(d)
     what = "predicted by fits that did not see their condition" if unseen else "fitted; nothing was held out"
     which = ["largest", "median", "smallest"] if len(chosen) > 2 else ["largest", "smallest"][: len(chosen)]
+    models = "both models (base dashed, answer solid)"
+    if not changed(d):
+        models = "the base model (dashed), to which the answer adds nothing"
     top = (
-        f"Top: measured force (grey) and both models (base dashed, answer solid), {what}, in trials with the "
-        f"{', '.join(which)} fall of the error; below, measured less model. "
+        f"Top: measured force (grey) and {models}, {what}, in trials with the {joined(which)} "
+        f"{'fall of the error' if changed(d) else 'error'}; below, measured less model. "
         if chosen
         else ""
     )
+    dotted = " Dotted: non-parametric discrepancy benchmark." if _benchmark(d) else ""
     if many:
+        marks = "; marks are fibres" if len(d.fibres) > 1 else ""
         return (
-            f"{top}Bottom: force RMSD of every trial, base against answer; marks are fibres. Below the line the "
-            f"answer {'predicts' if unseen else 'fits'} better."
+            f"{top}Bottom: force RMSD of every trial, base against answer{marks}. Below the dashed line the answer "
+            f"{'predicts' if unseen else 'fits'} better.{dotted}"
         )
-    return f"{top}Bottom: force RMSD of every trial, base (open) and answer (filled); bars are the trial's noise." + (
-        " Dotted: non-parametric discrepancy benchmark." if _benchmark(d) else ""
-    )
+    both = "base (open) and answer (filled)" if changed(d) else "base model"
+    return f"{top}Bottom: force RMSD of every trial, {both}; bars are the trial's noise.{dotted}"
 
 
 def _benchmark(d: Diagnosis) -> list[float]:
@@ -116,7 +124,7 @@ def _forces(part: Any, d: Diagnosis, chosen: Sequence[OfTrial], of: dict[Any, Tr
     from matplotlib.ticker import MaxNLocator
 
     axes = part.subplots(2, len(chosen), squeeze=False, sharex="col", height_ratios=(2.6, 1.3))
-    labels, limit, handles = trial_labels(d), 0.3, []
+    labels, limit, handles, count = trial_labels(d), 0.3, [], 1 + changed(d)
     for column, row in zip(axes.T, chosen, strict=True):
         t = of[key(row)]
         pair = _predicted(d, t)
@@ -125,13 +133,13 @@ def _forces(part: Any, d: Diagnosis, chosen: Sequence[OfTrial], of: dict[Any, Tr
         top, bottom = column
         handles += top.plot(*thinned(t.time_s, t.measured_f0), **DATA_LINE)
         bottom.axhline(0.0, color="black", linewidth=0.5)
-        for values, look in zip(pair, (BASE_LINE, ANSWER_LINE), strict=True):
+        for values, look in zip(pair[:count], LINES[:count], strict=True):
             handles += top.plot(*thinned(t.time_s, values), **look)
             left = 100.0 * (t.measured_f0 - values)
             bottom.plot(*thinned(t.time_s, left), **look)
             limit = max([limit, *finite([np.nanmax(np.abs(left)) if np.any(np.isfinite(left)) else None])])
-        low, high = (force(value, "") for value in errors(d, row))
-        top.set_title(f"{wrapped(labels[key(row)], 30, 1)}\nRMSD {low} → {high} % F$_0$", loc="left", fontsize=7)
+        told = " → ".join(force(value, "") for value in errors(d, row)[:count])
+        top.set_title(f"{wrapped(labels[key(row)], 30, 1)}\nRMSD {told} % F$_0$", loc="left", fontsize=7)
         top.yaxis.set_major_locator(MaxNLocator(4))
         bottom.yaxis.set_major_locator(MaxNLocator(3))
         bottom.xaxis.set_major_locator(MaxNLocator(5))
@@ -145,7 +153,7 @@ def _forces(part: Any, d: Diagnosis, chosen: Sequence[OfTrial], of: dict[Any, Tr
 
 def _pairs(part: Any, d: Diagnosis, rows: Sequence[OfTrial]) -> None:
     axis = part.subplots()
-    unseen, labels = held_out(d), trial_labels(d)
+    unseen, labels, count = held_out(d), trial_labels(d), 1 + changed(d)
     whole = (d.before, d.after)
     total = [s.heldout_rmsd_f0 if unseen else s.train_rmsd_f0 for s in whole]
     handles: list[Any] = []
@@ -154,7 +162,7 @@ def _pairs(part: Any, d: Diagnosis, rows: Sequence[OfTrial]) -> None:
         known = [100.0 * v for v in finite(pair)]
         if len(known) == 2:
             axis.plot(known, [place, place], color=DATA, linewidth=1.2, zorder=1)
-        for value, look in zip(pair, (BASE_DOT, ANSWER_DOT), strict=True):
+        for value, look in zip(pair[:count], DOTS[:count], strict=True):
             for x in finite([value]):
                 handles += axis.plot([100.0 * x], [place], markersize=size, **look)
     for place, t in enumerate(rows, start=1):

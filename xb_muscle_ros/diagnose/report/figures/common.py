@@ -8,6 +8,7 @@ import math
 import re
 import textwrap
 import warnings
+import zlib
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -32,6 +33,8 @@ BASE_DOT: dict[str, Any] = {
 }  # fmt: skip
 ANSWER_DOT: dict[str, Any] = {"marker": "o", "color": MODEL, "linestyle": "none", "label": "answer"}
 _BINS = 450
+LINES: tuple[dict[str, Any], ...] = (BASE_LINE, ANSWER_LINE)
+DOTS: tuple[dict[str, Any], ...] = (BASE_DOT, ANSWER_DOT)
 _NAME = 26
 _CLIP = re.compile(r"\bp[0-9a-f]{10}\b")
 
@@ -156,7 +159,9 @@ def svg(made: Any) -> str:
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         made.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     drawn = text.getvalue()
-    # Without the document type, which names a file elsewhere. Clips are named after coordinates whose last bits the
-    # layout's solver leaves to chance: here they are numbered.
-    numbers: dict[str, str] = {}
-    return _CLIP.sub(lambda found: numbers.setdefault(found[0], f"clip{len(numbers)}"), drawn[drawn.index("<svg") :])
+    # Without the document type, which names a file elsewhere.
+    drawn = drawn[drawn.index("<svg") :]
+    # Clips are named after coordinates whose last bits the layout's solver leaves to chance: here they are numbered,
+    # after the figure's own mark, so that figures may stand in one document.
+    mark, numbers = f"{zlib.crc32(_CLIP.sub('', drawn).encode()):08x}", dict[str, str]()
+    return _CLIP.sub(lambda found: numbers.setdefault(found[0], f"clip-{mark}-{len(numbers)}"), drawn)

@@ -10,8 +10,7 @@ import numpy as np
 
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.figures.common import (
-    ANSWER_DOT,
-    BASE_DOT,
+    DOTS,
     WIDTH_MM,
     Figure,
     finite,
@@ -46,7 +45,7 @@ def draw_fibres(d: Diagnosis) -> Figure | None:
         axes = made.subplots(2, 1, sharex=True, height_ratios=heights) if shown else [None, made.subplots()]
         if shown:
             _matrix(axes[0], shown, fibres)
-        handles = _errors(axes[1], fibres)
+        handles = _errors(axes[1], fibres, 1 + say.changed(d))
         upright = len(fibres) > _ROOMY
         names = [wrapped(row.fibre, 18, 2) if upright else wrapped(row.fibre, 11, 2) for row in fibres]
         axes[1].set_xticks(range(len(fibres)), names, fontsize=7, rotation=90 if upright else 0)
@@ -98,7 +97,7 @@ def _matrix(axis: Any, shown: Sequence[Component], fibres: Sequence[OfStudyFibre
     axis.spines[:].set_visible(False)
 
 
-def _errors(axis: Any, fibres: Sequence[OfStudyFibre]) -> list[Any]:
+def _errors(axis: Any, fibres: Sequence[OfStudyFibre], models: int) -> list[Any]:
     from matplotlib.ticker import MaxNLocator
 
     unseen = any(row.before.heldout_rmsd_f0 is not None for row in fibres)
@@ -106,9 +105,9 @@ def _errors(axis: Any, fibres: Sequence[OfStudyFibre]) -> list[Any]:
     for k, row in enumerate(fibres):
         scores = (row.before, row.after)
         pair = [s.heldout_rmsd_f0 if unseen else s.train_rmsd_f0 for s in scores]
-        handles += _pair(axis, k - (0.13 if row.left_out_rmsd_f0 else 0.0), pair, "o", "")
+        handles += _pair(axis, k - (0.13 if row.left_out_rmsd_f0 else 0.0), pair[:models], "o", "")
         if row.left_out_rmsd_f0:
-            handles += _pair(axis, k + 0.13, row.left_out_rmsd_f0, "s", ", fibre left out")
+            handles += _pair(axis, k + 0.13, row.left_out_rmsd_f0[:models], "s", ", fibre left out")
     axis.set_ylim(0.0, 1.08 * axis.get_ylim()[1])
     axis.yaxis.set_major_locator(MaxNLocator(5))
     axis.set_ylabel(f"{'Held-out force' if unseen else 'Force'} RMSD (% F$_0$)")
@@ -122,7 +121,7 @@ def _pair(axis: Any, at: float, pair: Sequence[float | None], mark: str, more: s
     if len(known) == 2:
         axis.plot([at, at], known, color=DATA, linewidth=1.2, zorder=1)
     handles: list[Any] = []
-    for value, look, colour in zip(pair, (BASE_DOT, ANSWER_DOT), (SECOND, MODEL), strict=True):
+    for value, look, colour in zip(pair, DOTS, (SECOND, MODEL), strict=False):
         for y in finite([value]):
             changed = {**look, "marker": mark, "markeredgecolor": colour, "label": look["label"] + more}
             handles += axis.plot([at], [100.0 * y], markersize=5, **changed)

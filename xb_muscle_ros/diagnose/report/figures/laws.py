@@ -22,7 +22,7 @@ def draw_laws(d: Diagnosis) -> Figure | None:
             (d.base_law, "base model", SECOND, "o"),
             (d.remaining.law, "answer", MODEL, "s"),
         )
-        if law is not None
+        if law is not None and (name == "base model" or law != d.base_law)
     ]
     if not laws:
         return None
@@ -56,7 +56,8 @@ def _caption(laws: list[tuple[Law, str]]) -> str:
     )
     return (
         "Left: weights of memories of stretch that describe the residual. Right: share of the residual's mean square "
-        f"in trials left out that they describe, by what they scale with; filled is the law. {told}."
+        "in trials left out that they describe, by what they scale with; filled is the law. "
+        + (f"{told[0].upper()}{told[1:]}." if told else "")
     )
 
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.figures.common import (
-    ANSWER_LINE,
-    BASE_LINE,
     DATA_LINE,
+    LINES,
     WIDTH_MM,
     Figure,
     finite,
@@ -35,7 +34,7 @@ def chosen_trials(d: Diagnosis, traces: Sequence[TrialTraces]) -> list[tuple[OfT
     """Trials in which the answer takes most off the square of the error, each of another solution where it can be."""
     of = {key(t): t for t in traces}
     rows = [t for t in d.trials if key(t) in of and len(finite((t.before_rmsd_f0, t.after_rmsd_f0))) == 2]
-    rows.sort(key=lambda t: t.after_rmsd_f0**2 - t.before_rmsd_f0**2)
+    rows.sort(key=lambda t: (t.after_rmsd_f0**2 - t.before_rmsd_f0**2, -t.before_rmsd_f0))
     first: list[OfTrial] = []
     for t in rows:
         if t.pca not in [other.pca for other in first]:
@@ -58,7 +57,7 @@ def draw_parts(d: Diagnosis, traces: Sequence[TrialTraces]) -> Figure | None:
         handles: list[Any] = []
         labels = trial_labels(d)
         for column, (row, t) in zip(axes.T, chosen, strict=True):
-            handles += _column(column, t, shown)
+            handles += _column(column, t, shown, 1 + say.changed(d))
             column[0].set_title(wrapped(labels[key(row)], 26, 1), loc="left", fontsize=7)
         _same_scale(axes[2:-1])
         _same_scale(axes[-1:])
@@ -77,21 +76,26 @@ def _caption(d: Diagnosis, shown: Sequence[Component], parts: int, trials: int) 
         else " The answer adds no component."
     )
     several = " of any fibre" if len(d.fibres) > 1 else ""
+    both = say.changed(d)
+    which = "the answer takes most off the error" if both else "the error is largest"
+    models = ", base model (dashed) and answer (solid)"
+    if not both:
+        models = " and base model (dashed), to which the answer adds nothing"
     return (
-        f"Trials{several} in which the answer takes most off the error, fitted to all trials. Top: length change; "
-        f"below, measured force (grey), base model (dashed) and answer (solid).{adds} Bottom: measured less model."
+        f"Trials{several} in which {which}, fitted to all trials. Top: length change; below, measured force (grey)"
+        f"{models}.{adds if both else ''} Bottom: measured less model."
         f"{shown_of(len(shown), parts, 'components', 'the most probable')}"
         f"{shown_of(trials, len(d.trials), 'trials', 'of different solutions where there are any')}"
     )
 
 
-def _column(column: Sequence[Any], t: TrialTraces, shown: Sequence[Component]) -> list[Any]:
+def _column(column: Sequence[Any], t: TrialTraces, shown: Sequence[Component], models: int) -> list[Any]:
     column[0].plot(*thinned(t.time_s, 100.0 * t.length_l0), color="black", linewidth=0.9)
     column[0].margins(y=0.15)
     handles = column[1].plot(*thinned(t.time_s, t.measured_f0), **DATA_LINE)
     for axis in column[2:]:
         axis.axhline(0.0, color="black", linewidth=0.5)
-    for values, look in ((t.before_f0, BASE_LINE), (t.after_f0, ANSWER_LINE)):
+    for values, look in zip((t.before_f0, t.after_f0)[:models], LINES[:models], strict=True):
         handles += column[1].plot(*thinned(t.time_s, values), **look)
         column[-1].plot(*thinned(t.time_s, 100.0 * (t.measured_f0 - values)), **look)
     for axis, c in zip(column[2:-1], shown, strict=True):

@@ -13,7 +13,7 @@ from xb_muscle_ros.diagnose.result import NAMED, SURE, Component, Diagnosis, Hel
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
 _MOST, _ROW_MM = 14, 6.4
-_PERCENT = (-200, -100, -50, -20, -10, -5, 0, 5, 10, 20, 30, 40, 50, 60, 70, 80, 90)
+_PERCENT = (-200, -100, -50, -20, -10, -5, -2, -1, 0, 1, 2, 5, 10, 20, 30, 40, 50, 60, 70, 80, 90)
 
 
 def draw_probabilities(d: Diagnosis) -> Figure | None:
@@ -106,10 +106,7 @@ def _gain_axis(axis: Any) -> None:
     quiet_rows(axis)
     ends = axis.get_xlim()
     top = axis.secondary_xaxis("top")
-    # Round percentages, as many as have room.
-    marks = [
-        p for p in (-50, -20, 0, 10, 20, 30, 40, 50, 60, 70, 80, 90) if ends[0] <= -math.log1p(-p / 100) <= ends[1]
-    ]
+    marks = [p for p in _PERCENT if ends[0] <= -math.log1p(-p / 100) <= ends[1]]
     places = [-math.log1p(-p / 100) for p in marks]
     least = (ends[1] - ends[0]) / 6.0
     kept: list[int] = []

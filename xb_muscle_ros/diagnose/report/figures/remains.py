@@ -21,9 +21,9 @@ from xb_muscle_ros.diagnose.report.figures.common import (
     trial_labels,
     wrapped,
 )
-from xb_muscle_ros.diagnose.report.phrases import ONE_WAY
+from xb_muscle_ros.diagnose.report.phrases import ONE_WAY, changed
 from xb_muscle_ros.diagnose.result import Diagnosis
-from xb_muscle_ros.diagnose.words import digits, phase_words
+from xb_muscle_ros.diagnose.words import phase_words
 from xb_muscle_ros.figures.style import figure
 
 _TRIALS, _PHASES = 36, 8
@@ -37,7 +37,7 @@ Cells = dict[tuple[Key, str], tuple[float, float, bool]]
 
 def draw_map(d: Diagnosis) -> Figure | None:
     """Two maps side by side, base and answer; None where there is none."""
-    maps = [cells(d.map_before), cells(d.map_after)]
+    maps = [cells(d.map_before), *([cells(d.map_after)] if changed(d) else [])]
     phases = _phases(d, maps[0])
     if not maps[0]:
         return None
@@ -49,11 +49,11 @@ def draw_map(d: Diagnosis) -> Figure | None:
     values = [abs(v[1]) for of in maps for v in of.values() if math.isfinite(v[1])]
     limit = 100.0 * max([_LEAST / 100.0, *values])
     framed = not all(v[2] for v in maps[0].values())
-    with figure(WIDTH_MM, 42.0 + _ROW_MM * len(shown)) as made:
-        axes = made.subplots(1, 2, sharey=True)
+    with figure(WIDTH_MM if len(maps) > 1 else 0.6 * WIDTH_MM, 42.0 + _ROW_MM * len(shown)) as made:
+        axes = made.subplots(1, len(maps), sharey=True, squeeze=False)[0]
         labels = trial_labels(d)
         image = None
-        for axis, of, title in zip(axes, maps, ("base model", "answer"), strict=True):
+        for axis, of, title in zip(axes, maps, ("base model", "answer"), strict=False):
             image = _draw(axis, of, [key(t) for t in shown], columns, limit, framed)
             axis.set_title(title, loc="left")
         axes[0].set_yticks(range(len(shown)), [labels[key(t)] for t in shown], fontsize=6.5)
@@ -65,8 +65,9 @@ def draw_map(d: Diagnosis) -> Figure | None:
 
 def _caption(d: Diagnosis, framed: bool, shown: int, columns: int, phases: Sequence[str]) -> str:
     frame = "Heavy frame: beyond chance and large enough to count." if framed else "Every cell of the base counts."
+    both = " and answer" if changed(d) else ""
     return (
-        "Residual of base and answer by trial and phase, % F0. Colour: mean. Number: root mean square, with + where "
+        f"Residual of base{both} by trial and phase, % F0. Colour: mean. Number: root mean square, with + where "
         "measured force is higher than the model's, − where lower, ± where it goes both ways. "
         f"{frame} Hatched: the trial has no such phase."
         f"{shown_of(shown, len(d.trials), 'trials', 'those with the largest residual of the base')}"
@@ -140,7 +141,9 @@ def _draw(axis: Any, of: Cells, trials: Sequence[Key], phases: Sequence[str], li
 def _signed(rms: float, mean: float) -> str:
     one_way = math.isfinite(mean) and abs(mean) >= ONE_WAY * rms
     sign = ("+" if mean > 0.0 else "−") if one_way else "±"
-    return sign + digits(100.0 * rms)
+    percent = 100.0 * rms
+    # As many characters in every cell.
+    return sign + (f"{percent:.2f}" if percent < 0.995 else f"{percent:.1f}" if percent < 9.95 else f"{percent:.0f}")
 
 
 @cache

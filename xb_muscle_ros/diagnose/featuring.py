@@ -1,0 +1,103 @@
+"""Tabulated features that no fit has met, as base and answer predict them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.diagnose.feature_predictions import as_table, predicted, relative_srs_rmsd
+from xb_muscle_ros.diagnose.feature_tables import FeatureTable, seen
+from xb_muscle_ros.diagnose.result import Diagnosis, Feature, FeatureScore
+from xb_muscle_ros.diagnose.search.system import Names
+from xb_muscle_ros.diagnose.searching import Searched
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.features import Feature as Cell
+from xb_muscle_ros.scores.conditions import CONDITIONS
+
+Array = npt.NDArray[np.float64]
+
+_KINDS = {
+    "isometric_force": "isometric force",
+    "srs_test": "SRS of the test stretch",
+    "srs_conditioning": "SRS of the conditioning stretch",
+}
+
+
+def with_features(d: Diagnosis, study: Searched, table: FeatureTable) -> Diagnosis:
+    """The record with what base and answer predict of a table's cells.
+
+    Relative SRS is scored at the conditions of which no trace of the study has the stretch.
+    """
+    rows: list[Feature] = []
+    values: dict[str, dict[str, Array]] = {"before": {}, "after": {}}
+    lines = list(table.told)
+    for i, fibre in enumerate(study.fibres):
+        cells = table.cells.get(fibre.name)
+        if cells is None:
+            continue
+        try:
+            both = [_of_set(study, names, i, cells) for names in ((), study.judged.chosen)]
+        except UserError as error:
+            lines.append(f"fibre {fibre.name}: features were not predicted: {error}")
+            continue
+        values["before"][fibre.name], values["after"][fibre.name] = both
+        rows += [
+            Feature(
+                fibre=fibre.name,
+                name=_KINDS[cell.kind],
+                condition=_condition(cell),
+                measured=float(cell.value),
+                before=float(before),
+                after=float(after),
+                used=seen(cell, study.studies[i].trials),
+            )
+            for cell, before, after in zip(cells, *both, strict=True)
+        ]
+    found = _scores(study, table, values)
+    return replace(d, features=tuple(rows), feature_scores=found, notes=(*d.notes, *lines))
+
+
+def _of_set(study: Searched, names: Names, i: int, cells: tuple[Cell, ...]) -> Array:
+    problem = study.explorer.systems[i].problem(names, study.explorer.fits[names][i].values)
+    return predicted(problem.fibre_at(problem.start), cells, problem.solution_shifts(problem.start))
+
+
+def _condition(cell: Cell) -> str:
+    where = f"pCa {cell.pca:g}"
+    if cell.kind != "srs_test":
+        return where
+    if cell.amplitude_l0 == 0.0:
+        return f"{where}, no conditioning stretch"
+    return f"{where}, after {100.0 * cell.amplitude_l0:.3g} % L0 and {cell.recovery_s:g} s"
+
+
+def _scores(study: Searched, table: FeatureTable, values: dict[str, dict[str, Array]]) -> tuple[FeatureScore, ...]:
+    """RMSD of relative SRS at concealed conditions, by reading and set of conditions."""
+    names = list(values["before"])
+    if not names:
+        return ()
+    shown = set()
+    for each in study.studies:
+        for cell in table.cells.get(each.fibre.name, ()):
+            if cell.kind == "srs_test" and seen(cell, each.trials):
+                shown.add((cell.amplitude_l0, cell.recovery_s))
+    concealed = [c for c in CONDITIONS if not any(_same(c, s) for s in shown)]
+    cells = {name: table.cells[name] for name in names}
+    both = [
+        relative_srs_rmsd(as_table(label, table.data, cells, values[label]), table.data, concealed)
+        for label in ("before", "after")
+    ]
+    rows = []
+    for reading, before in both[0].items():
+        after = both[1][reading]
+        for key, value in before.rmsd.items():
+            other = after.rmsd[key]
+            if value is not None and other is not None:
+                rows.append(FeatureScore(reading, key, before.conditions[key], value, other))
+    return tuple(rows)
+
+
+def _same(condition: tuple[float, float], other: tuple[float, float]) -> bool:
+    return abs(condition[0] - other[0]) <= 1e-6 and abs(condition[1] - other[1]) <= 1e-6 * max(other[1], 1.0)

@@ -1,0 +1,32 @@
+"""Persistent thick filament: it switches more slowly than force does, on and off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from xb_muscle_ros.mechanisms import ops
+from xb_muscle_ros.mechanisms.base import Parameter, Quantities
+from xb_muscle_ros.mechanisms.extra import Extra, Needs
+from xb_muscle_ros.mechanisms.ops import Expr
+
+PERSISTENCE = Parameter(
+    "thick_persistence", "1", "natural logarithm of the factor by which thick-filament switching is slower", -5.0, 10.0,
+    0.0, "Hill et al. 2021 (eLife 10:e68211); this package",
+)  # fmt: skip
+
+
+class PersistentThickFilament(Extra):
+    """J1 and J2 times exp(-p): the same equilibrium at every force, reached exp(p) times as slowly.
+
+    X-ray diffraction of tetani shows thick filaments that stay on while force is lost already (Hill et al. 2021). Heads
+    that a quick shortening has taken off are then still ready, and force comes back at the rate of attachment.
+    """
+
+    name = "persistent_thick_filament"
+    needs = Needs.SUPER_RELAXED
+    parameters = (PERSISTENCE,)
+
+    def modified(self, q: Quantities) -> Mapping[str, Expr]:
+        """See the class."""
+        slower = ops.exp(-q.thick_persistence)
+        return {"J1": q.J1 * slower, "J2": q.J2 * slower}

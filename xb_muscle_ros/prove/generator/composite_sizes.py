@@ -1,0 +1,235 @@
+"""Sizes of the effects of a composite: what each leaves beside everything else that is there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.diagnose.names import Name
+from xb_muscle_ros.prove.generator.case import Concealed, dressed, usable
+from xb_muscle_ros.prove.generator.effects import EFFECTS
+from xb_muscle_ros.prove.generator.nuisances import error_columns
+from xb_muscle_ros.prove.generator.ordinary import ORDINARY
+from xb_muscle_ros.prove.generator.recording import Faults
+from xb_muscle_ros.prove.generator.refit import Refit
+from xb_muscle_ros.prove.generator.rest import Rest, Taken
+from xb_muscle_ros.prove.generator.study import Planned
+from xb_muscle_ros.prove.generator.truth import study_forces
+from xb_muscle_ros.prove.generator.world import Mesh, Stimulus, World
+
+Array = npt.NDArray[np.float64]
+
+LEAST_F0, MOST_F0 = 0.003, 0.05
+"""What an effect is to leave beside the rest, F0."""
+# What one effect may change of the force before any refit (RMS), F0: more, and it is hardly one effect among others.
+_USUAL_CHANGE_F0 = 0.2
+# What stands in for a part of the base changes more.
+_CHANGE_F0 = {
+    name.value: 0.3
+    for name in (Name.SERIES_COMPLIANCE, Name.THIN_FILAMENT_COOPERATIVITY, Name.THICK_FILAMENT_COOPERATIVITY)
+}
+# Effects that are brief or weak need more than single ones do to be of any size; the change of force bounds them.
+_MORE = {Name.VISCOUS_DRAG.value: 2.0, Name.WEAKLY_BOUND_HEADS.value: 3.0}
+# First-order refits leave so much more than true ones, and so much more yet for each other effect in the model.
+_LINEAR, _BESIDE = 1.7, 0.3
+# A scale that is to change by less than this is near enough.
+_NEAR = 0.4
+# What a scale is changed by at once: refits of large effects end early and leave too much.
+_AT_ONCE = (0.5, 2.0)
+# How often refits take slopes anew, to scale an effect and to say its size.
+_ROUGHLY, _WELL = 0, 6
+# How often, and by what, all effects are made weaker where nobody would have kept the fibre.
+_WEAKER, _LESS = 4, 0.6
+# Steps of 1 ms are good to 0.05 % F0, the same with and without an effect.
+_COARSEST = Mesh(steps=1, dx=0.2, still=1e-5)
+
+
+class Sized:
+    """Sizes of effects in one fibre and one study with its ordinary errors.
+
+    Attributes:
+        stimuli: what the fibre was truly given, by ordinary errors.
+        constants: how many of the base can be fitted.
+        plain: what the base and ordinary errors can take up.
+    """
+
+    def __init__(self, base: World, study: Sequence[Planned], ordinary: Faults) -> None:
+        """Take slopes of the base."""
+        self._base, self._study, self._ordinary = base, study, ordinary
+        self.stimuli = given(study, ordinary)
+        slopes = self._slopes(base, [])
+        self.constants = slopes.constants
+        self.plain = Rest(slopes.columns, len(study))
+        self._plain_force = self._force([])
+
+    def difference(self, concealed: Sequence[Concealed]) -> Array:
+        """What effects change, F0, samples of all trials."""
+        return self._force(concealed) - self._plain_force
+
+    def of_faults(self, faults: Faults) -> Taken:
+        """What is left of all that artefacts change beyond the ordinary errors, by a linear refit of the base."""
+        world = dressed([], self._base)
+        both = [
+            [f.recorded(force, i) for i, force in enumerate(study_forces(world, given(self._study, f), _COARSEST))]
+            for f in (faults, self._ordinary)
+        ]
+        return self.plain.take(np.concatenate(both[0]) - np.concatenate(both[1]))
+
+    def scaled(
+        self, concealed: list[Concealed], sizes: Sequence[float], least: float
+    ) -> tuple[list[Concealed], list[float]]:
+        """Effects at scales that leave about what is asked for beside the rest, within what is plausible.
+
+        Args:
+            concealed: at usual scales.
+            sizes: asked for, F0.
+            least: no more is done where an effect leaves less than this even alone, F0.
+
+        Returns:
+            The effects, and what each leaves, F0; not finite where the fibre is not usable.
+        """
+        if not concealed:
+            return [], []
+        # True refits leave less than linear ones, and less beside others than alone.
+        more = _LINEAR * (1.0 + _BESIDE * (len(concealed) - 1))
+        alone = [self._alone(c, more * size) for c, size in zip(concealed, sizes, strict=True)]
+        # What leaves too little by itself leaves less beside others.
+        if not all(a.left >= least for a in alone):
+            return concealed, [a.left for a in alone]
+        concealed = self._kept([a.concealed for a in alone])
+        found = self.beside_rest(concealed, _ROUGHLY)
+        # A size that is not finite fails every comparison: such a fibre is not usable.
+        if any(size < LEAST_F0 or size > MOST_F0 for size in found):
+            factors = [float(np.clip(s / max(f, 1e-9), *_AT_ONCE)) for s, f in zip(sizes, found, strict=True)]
+            concealed = self._kept(
+                [
+                    c._replace(scale=min(c.scale * factor, a.most))
+                    for c, factor, a in zip(concealed, factors, alone, strict=True)
+                ]
+            )
+        return concealed, self.beside_rest(concealed, _WELL)
+
+    def _alone(self, concealed: Concealed, size: float) -> _Alone:
+        """The effect at a scale at which it alone leaves about so much, by linear refits."""
+        left, plausible = np.nan, EFFECTS[concealed.label].most * _MORE.get(concealed.label, 1.0)
+        most = plausible
+        for _ in range(4):
+            difference = self.difference([concealed])
+            left, change = self.plain.take(difference).rms, float(np.sqrt(np.mean(difference**2)))
+            factor = float(np.clip(size / max(left, 1e-9), 0.05, 20.0)) if np.isfinite(left) else 0.3
+            within = _CHANGE_F0.get(concealed.label, _USUAL_CHANGE_F0) / change if np.isfinite(change) else 0.3
+            most = min(plausible, concealed.scale * within)
+            wanted = concealed._replace(scale=min(concealed.scale * factor, most))
+            if abs(wanted.scale / concealed.scale - 1.0) < _NEAR:
+                break
+            concealed = wanted
+        return _Alone(concealed, left, most)
+
+    def _kept(self, concealed: list[Concealed]) -> list[Concealed]:
+        """So much less of all effects that the fibre is one that is kept; perhaps in vain."""
+        for _ in range(_WEAKER):
+            if usable(self._study, self._split(self._force(concealed))):
+                break
+            concealed = [c._replace(scale=_LESS * c.scale) for c in concealed]
+        return concealed
+
+    def beside_rest(self, concealed: Sequence[Concealed], anew: int) -> list[float]:
+        """What each effect leaves if the model has all others, and all that the model has is fitted again, F0.
+
+        Args:
+            concealed: all effects.
+            anew: how often refits may take their slopes anew.
+        """
+        data = self._force(concealed)
+        if not np.all(np.isfinite(data)):
+            return [np.nan] * len(concealed)
+        whole = self._slopes(self._base, concealed)
+        return [self._left_without(i, concealed, data, whole, anew) for i in range(len(concealed))]
+
+    def _left_without(self, i: int, concealed: Sequence[Concealed], data: Array, whole: _Slopes, anew: int) -> float:
+        """RMS that a refit of everything but effect i leaves, F0."""
+        others = [c for j, c in enumerate(concealed) if j != i]
+        # Constants, and scales of the others, by their logarithms; then errors, in SDs.
+        constants, coordinates = self.constants, self.constants + len(others)
+        columns = np.delete(whole.columns, constants + i, axis=1)
+        errors = columns[:, coordinates:]
+
+        def there(at: Array) -> tuple[World, list[Concealed]]:
+            changed = [c._replace(scale=c.scale * np.exp(s)) for c, s in zip(others, at[constants:], strict=False)]
+            return self._base.with_values(whole.refit.values_at(at[:constants])), changed
+
+        def model(at: Array) -> Array:
+            world, changed = there(at)
+            return (
+                np.concatenate(study_forces(dressed(changed, world), self.stimuli, _COARSEST))
+                + errors @ (at[coordinates:])
+            )
+
+        def slopes(at: Array) -> Array:
+            refit, scales = self._of_model(*there(at))
+            return np.column_stack([refit.jacobian, *scales, errors])
+
+        return Rest(columns, len(self._study)).refit(data, model, slopes, coordinates, anew).rms
+
+    def _slopes(self, base: World, concealed: Sequence[Concealed]) -> _Slopes:
+        """Slopes at a truth."""
+        refit, scales = self._of_model(base, concealed)
+        errors = error_columns(
+            lambda shift, gain: study_forces(
+                dressed(concealed, base), [_moved(s, shift, gain) for s in self.stimuli], _COARSEST
+            ),
+            self._study, refit.plain(), ORDINARY,
+        )  # fmt: skip
+        return _Slopes(refit, np.column_stack([refit.jacobian, *scales, *errors]), refit.jacobian.shape[1])
+
+    def _of_model(self, base: World, concealed: Sequence[Concealed]) -> tuple[Refit, list[Array]]:
+        """Slopes by constants (in the refit) and by logarithms of the effects' scales."""
+        refit = Refit(base, self.stimuli, lambda world: dressed(concealed, world), _COARSEST)
+        plain = np.concatenate(refit.plain())
+        scales = []
+        for i, c in enumerate(concealed):
+            more = [*concealed[:i], c._replace(scale=1.05 * c.scale), *concealed[i + 1 :]]
+            moved = study_forces(dressed(more, base), self.stimuli, _COARSEST)
+            scales.append((np.concatenate(moved) - plain) / 0.05)
+        return refit, scales
+
+    def _force(self, concealed: Sequence[Concealed]) -> Array:
+        return np.concatenate(study_forces(dressed(concealed, self._base), self.stimuli, _COARSEST))
+
+    def _split(self, joined: Array) -> list[Array]:
+        return np.split(joined, np.cumsum([s.length.size for s in self.stimuli])[:-1])
+
+
+class _Alone(NamedTuple):
+    """An effect as it is alone, what it leaves by a linear refit, F0, and the scale that is not to be exceeded."""
+
+    concealed: Concealed
+    left: float
+    most: float
+
+
+class _Slopes(NamedTuple):
+    """Change of all forces, F0, by one prior SD of each coordinate.
+
+    Attributes:
+        refit: of constants.
+        columns: constants, then logarithms of the effects' scales, then ordinary errors; shape (samples, coordinates).
+        constants: how many there are.
+    """
+
+    refit: Refit
+    columns: Array
+    constants: int
+
+
+def given(study: Sequence[Planned], faults: Faults) -> list[Stimulus]:
+    """What the fibre was truly given."""
+    return [trial.stimulus(faults.pca_shift.get(trial.pca, 0.0), faults.length_gain) for trial in study]
+
+
+def _moved(stimulus: Stimulus, shift: float, gain: float) -> Stimulus:
+    """The same at a pCa higher by `shift`, with length changes larger by `gain`."""
+    return Stimulus((1.0 + gain) * stimulus.length, stimulus.calcium * 10.0**-shift)
