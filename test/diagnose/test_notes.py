@@ -100,3 +100,11 @@ def test_what_could_not_be_tried_is_said_and_long_lists_are_cut() -> None:
     assert line.endswith(" and 3 more")
     (line,) = notes.of_search([], ["series_compliance"])
     assert line.endswith(": series_compliance")
+
+
+def test_trials_that_stay_in_every_fit_are_told() -> None:
+    trials: Any = [SimpleNamespace(name=name) for name in "abc"]
+    assert notes.of_folds(trials, []) == []
+    assert notes.of_folds(trials, [{"a", "b"}, {"c"}]) == []
+    (line,) = notes.of_folds(trials, [{"a"}, {"c"}])
+    assert line == "trial b stayed in every fit: pCa 4.5 defines F0, so nothing is predicted there"

@@ -99,3 +99,12 @@ def test_families_are_those_of_the_names() -> None:
     assert found["parallel_viscoelasticity"] == [DRAG, VISCO]
     assert found["calcium_dependent_elasticity"] == [TITIN, STIFFNESS]
     assert np.sum([len(v) for v in found.values()]) == 4
+
+
+def test_a_contribution_is_what_the_best_set_with_a_name_takes_off() -> None:
+    rows = {(): 1e-4, (DRAG,): 4e-5, (TITIN,): 9e-5, (DRAG, TITIN): 3.1e-5}
+    e = explorer({names: [fit(names, 9.0 * len(names), mean_square_f0=ms)] for names, ms in rows.items()})
+    found = averaged(e)
+    assert found.contribution_f0([TITIN]) == pytest.approx(3e-3)
+    assert found.contribution_f0([DRAG]) == pytest.approx(math.sqrt(9e-5 - 3.1e-5))
+    assert found.contribution_f0([LATTICE]) == 0.0

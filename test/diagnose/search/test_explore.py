@@ -101,7 +101,6 @@ def test_candidates_go_with_every_fibre_s_model_and_are_not_there_yet() -> None:
     assert set(MEASUREMENT) <= set(found)
     assert DRAG not in found
     assert Name.THIN_FILAMENT_COOPERATIVITY not in found
-    assert Name.HALF_SARCOMERE_SPREAD not in found
     hill = System(given_fibre("hill"), (), np.ones(COUNT), NOISE_F0)
     both = Explorer([*e.systems, hill], Effort(), QUIET)
     assert not {Name.WEAKLY_BOUND_HEADS, Name.LATTICE_SPACING} & set(both.candidates(()))
@@ -182,8 +181,8 @@ def test_models_are_compiled_side_by_side_where_there_are_several(
     compiling.compile_first([fibre, changed(load_fibre("14Dec2017b", "2state"), {"smoothing": 0.0}, "test")],
                             Options(processes=processes, quiet=True))  # fmt: skip
     models = [(task["problem"]["fibre"]["model"], task["problem"]["fibre"]["method"]) for task in asked]
-    # The whole, the base by its distribution, and the frame; for both fibres once.
-    assert len(models) == len(set(models)) == (3 if compiles else 0)
+    # The whole, the base by its distribution, and two frames; for both fibres once.
+    assert len(models) == len(set(models)) == (4 if compiles else 0)
     assert not compiles or models[1] == ("2state", "characteristics")
     monkeypatch.setattr(compiling, "is_compiled", lambda *_: True)
     asked.clear()

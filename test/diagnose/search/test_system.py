@@ -10,6 +10,7 @@ from made_trials import given_fibre
 
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.search.system import BEYOND, System, label, ordered
+from xb_muscle_ros.fit.features import F0_ANCHOR
 from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
 from xb_muscle_ros.models.catalogue import CATALOGUE
 
@@ -73,6 +74,9 @@ def test_a_trial_left_out_takes_its_weights_along(system: System) -> None:
     assert np.array_equal(rest.weights, system.weights[first.measured_f0.size :])
     assert np.array_equal(rest.measured, second.measured_f0)
     assert system.without(set()).weights.size == system.weights.size
+    # The first one's isometric force is the unit of force, whether it is there or not.
+    assert rest.features == (F0_ANCHOR,)
+    assert system.without({second.name}).features == system.features == ()
 
 
 def test_what_the_gaussian_form_leaves_out_is_added_everywhere(system: System) -> None:
