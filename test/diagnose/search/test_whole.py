@@ -62,7 +62,7 @@ def test_heads_of_a_filament_that_nothing_puts_to_rest_stay_awake(model: str) ->
         assert found.outputs["drx"] == ready["drx"]
         assert found.rates["drx"] == pytest.approx(-found.rates["q0"] - found.rates.get("r", 0.0), rel=1e-9)
     # At rest all are ready.
-    assert evaluated(everything, {"q0": 1e-9, "q2": 1e-9}).outputs["drx"] == 1.0
+    assert evaluated(everything, {"q0": 0.1, "q2": 0.1, "calcium": 1.0}).outputs["drx"] == 1.0
 
 
 def mechanisms_alone() -> list[tuple[str, Name]]:
@@ -94,7 +94,7 @@ def test_one_mechanism_in_the_whole_is_the_small_model_with_it(model: str, name:
 
 
 def test_a_frame_with_nothing_else_is_the_small_model_of_that_frame() -> None:
-    for model, frame in (("2state", FRAMES[:1]), ("2state_rigid", FRAMES), ("hill", FRAMES[1:])):
+    for model, frame in (("2state", FRAMES[:1]), ("2state_rigid", FRAMES), ("hill", FRAMES[1:2])):
         given = given_fibre(model)
         big = whole(given, frame)
         small = only(big, given, frame)

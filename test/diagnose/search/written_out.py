@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from xb_muscle_ros.mechanisms.extra import InSeries
 from xb_muscle_ros.models import intrinsics
 from xb_muscle_ros.models.composition import INPUTS, OUTPUTS, Equations
 from xb_muscle_ros.models.fibre_file import Fibre
@@ -79,5 +80,13 @@ def some_states(fibre: Fibre, count: int, seed: int = 0) -> list[dict[str, float
 
 
 def with_ready_heads(state: Mapping[str, float]) -> dict[str, float]:
-    """A state with the heads that are ready where nothing puts any to rest: all that are not attached or torn off."""
-    return {"drx": 1.0 - state.get("q0", 0.0) - state.get("r", 0.0), **state}
+    """A state with the heads that are ready where nothing puts any to rest: all that are not attached or torn off.
+
+    Those of the half-sarcomere in series as well.
+    """
+    ready = {
+        f"{of}drx": 1.0 - state.get(f"{of}q0", 0.0) - state.get(f"{of}r", 0.0)
+        for of in ("", InSeries.PREFIX)
+        if f"{of}q0" in state
+    }
+    return {**ready, **state}
