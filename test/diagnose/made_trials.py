@@ -32,7 +32,16 @@ def truth(model: str = "3state_coop", base: str = "3state_coop", **values: float
     """A fibre that differs from the file's in its parameters, and by what is concealed."""
     given = changed(load_fibre(FIBRE, model), {"smoothing": 0.0, **values}, "test")
     scaled = {n: given.values[n] * factor for n, factor in (("f", 1.2), ("k21", 0.85), ("kse", 1.15))}
-    return replace(given, values=MappingProxyType({**given.values, **scaled}))
+    return in_its_own_f0(replace(given, values=MappingProxyType({**given.values, **scaled})))
+
+
+def in_its_own_f0(fibre: Fibre) -> Fibre:
+    """The fibre in units of its own isometric force at pCa 4.5, as forces are recorded."""
+    for _ in range(4):
+        muscle = Muscle(fibre)
+        force = muscle.outputs(muscle.settle(0.0, 10.0**1.5)).force_f0
+        fibre = changed(fibre, {"Fscale": fibre.values["Fscale"] / force}, "test")
+    return fibre
 
 
 def trials_of(
