@@ -2,119 +2,166 @@
 
 from __future__ import annotations
 
+import itertools
 import json
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
+from recorded_cases import Case
+from recorded_predictions import END_S
+from recorded_tables import components, concealed, feature_scores, fibres, force, places, probability, sets, table
 
-# What is averaged at the end of a trial, s.
-_END_S = 0.5
-_CANDIDATES, _PLACES = 8, 6
+from xb_muscle_ros.diagnose.report import output, prose
+from xb_muscle_ros.diagnose.result import Diagnosis, Kind
 
 INTRO = """# Real recordings
 
-Made by `scripts/diagnose_recordings.py`: trials are imported, a base model is fitted to some of them, these are
-diagnosed, and the others, concealed until then, are predicted. Of a concealed trial nothing is used but its own
-force before anything moves, and that only for faults of the measurement. Differences are root mean squares in % F0.
+Made by `scripts/diagnose_recordings.py`: trials are imported, some of them are diagnosed, and the others, concealed
+until then, are predicted by two fibre files: the fitted base, and the answer's augmented fibre. Of a concealed trial
+nothing is used but its own force before anything moves, and that only for its solution's pCa shift and its force
+offset. RMSD is the root mean square of simulated less measured force, in % F0. "Held out" is that of conditions which
+the diagnosis itself left out of its fits (whole solutions where each has two trials or more).
 """
+FORMER = "*This section was made by the former version of the diagnosis (format 1), and has not been run again.*"
+_MARK = "<!-- diagnosis.json, format {} -->"
+_MOST_NOTES = 8
+_HEADING = re.compile(r"^## (.+)$", re.MULTILINE)
 
 
-def write_page(cases: Sequence[tuple[str, str, Path]], images: str) -> str:
+def write_page(done: Sequence[tuple[Case, Path]], images: str, former: str = "") -> str:
     """The page.
 
     Args:
-        cases: key, what to say first, and folder of each case that is done.
+        done: cases that are done, each with its folder.
         images: folder of the figures, as the page links it.
+        former: the page as it stands; its sections of cases that are not among `done` are kept.
     """
-    return "\n".join([INTRO, *(section(key, about, folder, images) for key, about, folder in cases)])
+    read = [(case, folder, output.read(folder), _rows(folder)) for case, folder in done]
+    made = [section(case, d, rows, images) for case, _, d, rows in read if not case.pooled or case.concealed]
+    made += [_singly(key, [(c, d) for c, _, d, _ in read if c.pooled == key]) for key in _pools(read)]
+    titles = {match[1] for text in made for match in _HEADING.finditer(text)}
+    kept = [text for title, text in former_sections(former) if title not in titles]
+    return "\n".join([INTRO, *([_overview(read)] if read else []), *made, *kept])
 
 
-def section(key: str, about: str, folder: Path, images: str) -> str:
+def former_sections(page: str) -> list[tuple[str, str]]:
+    """Title and text of each section of a page, those of the former diagnosis marked as such."""
+    found = []
+    starts = [*(match.start() for match in _HEADING.finditer(page)), len(page)]
+    for begin, end in itertools.pairwise(starts):
+        text = page[begin:end].rstrip() + "\n"
+        head, _, rest = text.partition("\n")
+        title = head.removeprefix("## ")
+        if title in ("Overview", "Each fibre by itself"):
+            continue
+        if "<!-- diagnosis.json, format" not in text and FORMER not in text:
+            text = f"{head}\n\n{FORMER}\n{rest}"
+        found.append((title, text))
+    return found
+
+
+def _rows(folder: Path) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = json.loads((folder / "predictions.json").read_text(encoding="utf-8"))["concealed"]
+    return rows
+
+
+def _pools(read: Sequence[tuple[Case, Path, Diagnosis, list[dict[str, Any]]]]) -> list[str]:
+    return list(dict.fromkeys(case.pooled for case, *_ in read if case.pooled))
+
+
+def _overview(read: Sequence[tuple[Case, Path, Diagnosis, list[dict[str, Any]]]]) -> str:
+    """A line for each study."""
+    heads = ["study", "base", "verdict", "answer", "held out", "concealed trials better", "worse unwarned"]
+    cells = []
+    for case, _, d, rows in read:
+        both = [(r["rmsd_f0"]["before"], r["rmsd_f0"].get("after"), r["warned"]) for r in rows]
+        judged = [(b, a, w) for b, a, w in both if b is not None and "after" in rows[0]["rmsd_f0"]]
+        better = sum(a is not None and a < b for b, a, _ in judged)
+        worse = sum((a is None or a > b + 0.02) and not w for b, a, w in judged)
+        answer = _answer(d)
+        held = force(d.before.heldout_rmsd_f0) + (f" → {force(d.after.heldout_rmsd_f0)}" if answer else "")
+        cells.append(
+            [
+                case.title, f"`{d.model}`", d.verdict.value, answer or "–", held,
+                f"{better} of {len(rows)}" if judged else "–", str(worse) if judged else "–",
+            ]
+        )  # fmt: skip
+    told = '"Worse unwarned": trials that the answer predicts worse than the base by more than 2 % F0, or not at all, '
+    return f"## Overview\n\n{table(heads, cells)}\n\n{told}without a warning given beforehand.\n"
+
+
+def _answer(d: Diagnosis) -> str:
+    return ", ".join(f"{c.members[0]} ({probability(c.inclusion_probability)})" for c in d.named)
+
+
+def section(case: Case, d: Diagnosis, rows: Sequence[dict[str, Any]], images: str) -> str:
     """One case."""
-    facts = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
-    found = json.loads((folder / "predictions.json").read_text(encoding="utf-8"))
-    with np.load(folder / "predictions.npz") as arrays:
-        ends = [_ends(arrays, f"p{k}") for k in range(len(found["concealed"]))]
+    effort = "quick search" if d.quick else "full search"
+    many = f", {len(d.fibres)} fibres" if len(d.fibres) > 1 else ""
     parts = [
-        about,
-        f"![{about.splitlines()[0].lstrip('# ')}]({images}/recorded_{key}.png)",
-        facts["summary"],
-        _verdict(facts, found),
-        "Where the base differs most:\n\n" + places(facts["mismatch"]),
-        "What was tried:\n\n" + candidates(facts["candidates"]),
-        "Concealed trials (–: no solution at these parameters, heads are stretched past where the form of their "
-        "distribution holds):\n\n" + concealed(found, ends),
+        f"## {case.title}\n\n{_MARK.format(d.format_version)}",
+        case.about,
+        f"![{case.title}]({images}/recorded_{case.key}.png)",
+        f"**{prose.headline(d)}**",
+        " ".join(prose.summary(d)),
+        f"Base `{d.model}`, {len(d.trials)} trials{many}, {effort}, {d.seconds:.0f} s. Verdict: {d.verdict.value}.",
+        "Components (share: of the base's mismatch that comes back without it; gain: mean logarithm of the ratio of "
+        "held-out RMSD without and with it):\n\n" + components(d),
+        "Each fibre:\n\n" + fibres(d) if many else "",
+        "Where the base differs most:\n\n" + places(d.mismatch),
+        "What the answer leaves:\n\n" + places(d.remaining.where) if d.named else "",
+        "Most probable sets:\n\n" + sets(d),
+        _concealed(d, rows),
+        "RMSD of relative SRS at conditions that no trace has (`empirical_srs.json`, readings of "
+        "[evaluate.md](evaluate.md)):\n\n" + feature_scores(d)
+        if d.feature_scores
+        else "",
+        _lines("Warnings, given before anything concealed was looked at", d.warnings),
+        _lines("Missing", d.missing),
+        _lines("Notes", d.notes),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def _verdict(facts: Mapping[str, Any], found: Mapping[str, Any]) -> str:
-    answer = f": {', '.join(facts['answer'])}" if facts["answer"] else ""
-    effort = "quick" if facts["quick"] else "full"
-    lines = [
-        f"Verdict (`{facts['model']}`, {len(facts['trials'])} trials, {effort} search): "
-        f"**{facts['verdict']}{answer}**, confidence {facts['confidence']:.2f}. "
-        f"Best explanation found: {found['best_found']}."
-    ]
-    lines += [f"- {'passed' if c['passed'] else 'failed'}: {c['name']} ({c['value']})" for c in facts["checks"]]
-    lines += [f"- missing: {line}" for line in facts["missing"]]
-    return "\n".join(lines)
-
-
-def places(mismatch: Sequence[Mapping[str, Any]]) -> str:
-    """The largest cells of a mismatch as Markdown."""
-    if not mismatch:
-        return "nowhere by more than noise."
-    rows = [
-        [m["trial"], m["phase"], f"{m['start_s']:.2f}–{m['end_s']:.2f}", _percent(m["size_f0"]), _percent(m["mean_f0"])]
-        for m in mismatch[:_PLACES]
-    ]
-    return _table(["trial", "phase", "time (s)", "size", "mean, measured less model"], rows)
-
-
-def candidates(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The base and the best explanations as Markdown."""
-    fitted = [r for r in rows if r["train_rmsd_f0"] is not None]
-    chosen = [r for r in fitted if r["kind"] == "base"] + [r for r in fitted if r["kind"] != "base"][:_CANDIDATES]
-    cells = [[r["name"], _percent(r["train_rmsd_f0"]), _percent(r["heldout_rmsd_f0"])] for r in chosen]
-    return _table(["explanation", "shown trials", "the same, each left out of the fit"], cells)
-
-
-def concealed(found: Mapping[str, Any], ends: Sequence[tuple[float, float, float]]) -> str:
-    """How concealed trials are predicted, as Markdown."""
-    rows = found["concealed"]
+def _concealed(d: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
     if not rows:
-        return "none."
-    labels = list(rows[0]["rmsd_f0"])
-    cells = [
-        [row["tests"], row["trial"], *(_percent(row["rmsd_f0"][n]) for n in labels), " / ".join(map(_percent, end))]
-        for row, end in zip(rows, ends, strict=True)
-    ]
-    total = [_percent(_overall([row["rmsd_f0"][n] for row in rows])) for n in labels]
-    return _table(
-        ["tests", "trial", *labels, f"last {_END_S:g} s: measured / base / best"], [*cells, ["all", "", *total, ""]]
+        return ""
+    if not d.augmented:
+        told = "Concealed trials (no mechanism is in the answer: the base alone predicts them):"
+    else:
+        told = (
+            "Concealed trials (–: no solution at these parameters; pCa shift and offset: what each model asks of the "
+        )
+        told += "trial's force before anything moves):"
+    end = f"Last column: mean force of the last {END_S:g} s, % F0."
+    return f"{told}\n\n{concealed(rows)}\n\n{end}"
+
+
+def _lines(head: str, lines: Sequence[str]) -> str:
+    if not lines:
+        return ""
+    more = [f"- and {len(lines) - _MOST_NOTES} more"] if len(lines) > _MOST_NOTES else []
+    return "\n".join([f"{head}:\n", *(f"- {line}" for line in lines[:_MOST_NOTES]), *more])
+
+
+def _singly(key: str, found: Sequence[tuple[Case, Diagnosis]]) -> str:
+    """Fibres of a pooled study, each by itself: which names come back, and what they gain."""
+    model = found[0][1].model
+    heads = ["fibre", "verdict", "answer", "RMSD, base → answer", "held out, base → answer", "ratio"]
+    cells = []
+    for _, d in found:
+        before, after = d.before.heldout_rmsd_f0, d.after.heldout_rmsd_f0
+        ratio = f"{after / before:.2f}" if before and after else "–"
+        train = f"{force(d.before.train_rmsd_f0)} → {force(d.after.train_rmsd_f0)}"
+        cells.append(
+            [d.fibres[0], d.verdict.value, _answer(d) or "–", train, f"{force(before)} → {force(after)}", ratio]
+        )
+    names = [c.members[0] for _, d in found for c in d.named if c.kind is Kind.MECHANISM]
+    count = {n: names.count(n) for n in sorted(set(names), key=lambda n: (-names.count(n), n))}
+    told = "; ".join(f"{name} in {k} of {len(found)}" for name, k in count.items()) or "no mechanism in any fibre"
+    return (
+        f"## Each fibre by itself, base `{model}`\n\n{_MARK.format(found[0][1].format_version)}\n\n"
+        f"{table(heads, cells)}\n\nNamed with probability 0.5 and more: {told}. Key of the pooled study: `{key}`.\n"
     )
-
-
-def _overall(values: Sequence[float | None]) -> float | None:
-    known = [v for v in values if v is not None]
-    return float(np.sqrt(np.mean(np.square(known)))) if len(known) == len(values) else None
-
-
-def _ends(arrays: Mapping[str, Any], key: str) -> tuple[float, float, float]:
-    """Mean forces at the end of a trial: measured, base, best explanation."""
-    time = arrays[f"{key}_time_s"]
-    late = time >= time[-1] - _END_S
-    measured, before, after = (float(np.mean(arrays[f"{key}_{n}_f0"][late])) for n in ("measured", "before", "after"))
-    return measured, before, after
-
-
-def _percent(value: float | None) -> str:
-    return "–" if value is None or not np.isfinite(value) else f"{100.0 * value:.2f}"
-
-
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])

@@ -160,3 +160,9 @@ def test_lines_on_what_a_fibre_lacks() -> None:
     )
     assert borrowed_line(fibre) == ""
     assert "that of 3state_coop is used" in borrowed_line(load_fibre("18Dec2017a", "3state_coop_rigid"))
+
+
+def test_the_shape_of_a_soft_parallel_spring_is_fitted_where_a_model_has_one() -> None:
+    shape = {"lpe0", "pe_sharpness"}
+    assert shape <= set(free_names(load_fibre("18Dec2017a", "3state_coop_softplus"), None, (), {}))
+    assert not shape & set(free_names(load_fibre("18Dec2017a", "3state_coop"), None, (), {}))

@@ -18,10 +18,11 @@ from xb_muscle_ros.models.parameters import PARAMETERS
 
 Array = npt.NDArray[np.float64]
 
-# What the paper fitted, over all its models (van der Zee et al. 2026, "Fitted model parameters").
+# What the paper fitted, over all its models (van der Zee et al. 2026, "Fitted model parameters"), and the shape of a
+# soft parallel spring: where it stays as it starts, a fit makes a measurement artefact of what the spring gets wrong.
 FITTED = (
     "f", "k11", "k21", "k22", "dLcrit", "kon", "koop", "kappa", "n", "JF", "vmax", "act_max",
-    "kse", "kse0", "kpe", "Fpe0",
+    "kse", "kse0", "kpe", "Fpe0", "lpe0", "pe_sharpness",
 )  # fmt: skip
 # How far a fit may go from its start where nothing else is said: a factor either way.
 REACH = 100.0

@@ -27,6 +27,9 @@ from xb_muscle_ros.models.registry import compose, model_of_set
 
 Array = npt.NDArray[np.float64]
 
+# Less than this is rounding, F0.
+_LEAST_F0 = 1e-6
+
 
 def by_distribution(fibre: Fibre) -> Fibre:
     """The fibre with its heads' strain as a distribution, nothing assumed of its shape."""
@@ -55,6 +58,8 @@ def closure_error(problem: Problem, given: Fibre) -> Mapping[str, Array]:
         bare = replace(
             problem, fibre=by_distribution(only(problem.fibre_at(problem.start), given, ())), correction=None
         )
-        return difference(bare, problem.start).force
+        found = difference(bare, problem.start).force
     except UserError:
         return {}
+    # Without a head on its strain, as with cross-bridges off, there is nothing to take out.
+    return found if any(np.any(np.abs(values) > _LEAST_F0) for values in found.values()) else {}

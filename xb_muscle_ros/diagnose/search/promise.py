@@ -127,7 +127,7 @@ def promise(linear: Linear, name: Name) -> Promise:
         information = np.array([(effect / entry.size) ** 2])
         moves, (share,), gain, mean_square = linear.solve(column[:, None], information, np.zeros(1))
         lower = next(c.lower for c in problem.coordinates if c.name == entry.effect)
-        if share <= 0.0 and lower >= 0.0:
+        if share == 0.0 or (share < 0.0 and lower >= 0.0):
             continue
         if gain > best.gain:
             kept = float(np.sign(share) * np.clip(abs(share), _LEAST_SHARE, _MOST_SHARE))

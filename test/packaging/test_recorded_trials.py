@@ -12,12 +12,12 @@ import pytest
 
 from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
 
-_SCRIPT = Path(__file__).parents[2] / "scripts" / "recorded_cases.py"
+_SCRIPT = Path(__file__).parents[2] / "scripts" / "recorded_trials.py"
 
 
 @pytest.fixture(scope="module")
 def cases() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("recorded_cases", _SCRIPT)
+    spec = importlib.util.spec_from_file_location("recorded_trials", _SCRIPT)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -59,16 +59,16 @@ def test_chosen_follows_the_order_of_the_patterns_and_matches_whole_names(cases:
     assert [t.facts.trial for t in cases.chosen(trials, ("b1", r"a1"))] == ["b1", "a1"]
 
 
-def test_resting_spring_is_the_line_through_resting_forces(cases: ModuleType) -> None:
+def test_at_rest_takes_each_trials_length_and_force_before_anything_happens(cases: ModuleType) -> None:
     trials = []
     for stretch, force in ((0.0, 0.02), (0.1, 0.05), (0.2, 0.08)):
         trial = _trial(length_l0=stretch)
         time, none = trial.time_s, np.full(1, 0.1)
         measured = np.where(time < 1.0, force, 9.0)
         trials.append(Trial(trial.facts, time, trial.length_m, np.zeros(1), none, time, measured))
-    found = cases.resting_spring(trials, 0.9, 130.0)
-    assert found["kpe"] * 130.0 == pytest.approx(0.3)
-    assert found["Fpe0"] == pytest.approx(0.02)
+    length, force = cases.at_rest(trials, 0.9)
+    assert length == pytest.approx([0.0, 0.1, 0.2])
+    assert force == pytest.approx([0.02, 0.05, 0.08])
 
 
 def test_soft_spring_finds_the_spring_that_made_the_forces(cases: ModuleType) -> None:
