@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from xb_muscle_ros.diagnose import names, result
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, MECHANISMS, Name
 from xb_muscle_ros.measurement.faults import FAULTS
 from xb_muscle_ros.models.catalogue import CATALOGUE
@@ -18,7 +17,3 @@ def test_names_are_those_of_mechanisms_and_faults() -> None:
 def test_no_family_has_physics_and_measurement() -> None:
     physics, faults = ({FAMILY[n] for n in of} for of in (MECHANISMS, MEASUREMENT))
     assert not physics & faults
-
-
-def test_verdicts_are_the_same_six() -> None:
-    assert {v.value for v in names.Verdict} == {v.value for v in result.Verdict}

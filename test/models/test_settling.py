@@ -42,12 +42,11 @@ def test_the_quick_way_ends_where_the_slow_one_does(name: str, monkeypatch: pyte
 
 
 @pytest.mark.parametrize("name", RELEASED)
-def test_with_smooth_functions_too(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """At pCa 9 some 1e-9 of all heads are attached; smooth functions let what they bear be anything below 1e-4 F0."""
+def test_smooth_functions_take_the_slow_way(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They have further states of rest: of 2state at pCa 9, mean strains of -17000 power strokes."""
     muscle = Muscle(released(name, 100.0))
-    for calcium, within in ((1e-3, 1e-4), (0.1, 1e-9), (0.8, 1e-9), (30.0, 1e-9)):
-        quick, slow = muscle.settle(0.0, calcium), slowly(muscle, 0.0, calcium, monkeypatch)
-        assert muscle.outputs(quick).force_f0 == pytest.approx(muscle.outputs(slow).force_f0, abs=within)
+    for calcium in (1e-3, 0.8, 30.0):
+        assert np.array_equal(muscle.settle(0.0, calcium), slowly(muscle, 0.0, calcium, monkeypatch))
 
 
 def test_where_it_does_not_come_to_rest_the_slow_way_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
