@@ -15,6 +15,7 @@ import pytest
 import yaml
 
 from xb_muscle_ros.cli.main import main
+from xb_muscle_ros.diagnose.report.traces import read_traces
 from xb_muscle_ros.models.fibre_file import changed, find_fibre_file, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.made import made
@@ -148,10 +149,12 @@ def diagnose(bag: Path, fibre: Path, out: Path) -> dict[str, float]:
     )
     assert main(["diagnose", str(first), "--fiber", str(fibre), "--out", str(out), *given]) == 0
     found = json.loads((out / "diagnosis.json").read_text())
-    assert found["verdict"] == "parameters"
+    assert found["verdict"] in ("none", "parameters")
     (trial,) = found["trials"]
-    starts = {phase["name"]: phase["start_s"] for phase in trial["phases"]}
-    return {"start": found["start"]["train_rmsd_f0"], "noise": trial["noise_sd_f0"], **starts}
+    (traces,) = read_traces(out / "traces.npz")
+    start = float(np.sqrt(np.mean((traces.start_f0 - traces.measured_f0) ** 2)))
+    starts = {name: start_s for name, start_s, _ in trial["phases"]}
+    return {"start": start, "noise": trial["noise_sd_f0"], **starts}
 
 
 RUN: dict[str, Callable[[Path, Path, Path], dict[str, float]]] = {
@@ -200,7 +203,9 @@ def test_a_bag_of_any_kind_gives_the_numbers_of_the_own_one(
     expected = right(command)
     capsys.readouterr()
     found = RUN[command](bags[kind], fibre, tmp_path)
-    said = capsys.readouterr().err
+    captured = capsys.readouterr()
+    # A diagnosis has it among its own lines, wrapped.
+    said = " ".join(f"{captured.out} {captured.err}".split()) if command == "diagnose" else captured.err
     # Phases that were found are good to about a sample, 2 ms; a pause of none is told as one of another length.
     skipped = {"2 recovery_s", "1 recovery_s", "0 recovery_s"}
     assert set(found) - skipped >= set(expected) - skipped

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from xb_muscle_ros.cli.main import main
-from xb_muscle_ros.diagnose import outcome
+from xb_muscle_ros.diagnose.outputs import NEXT, older_results
 from xb_muscle_ros.trials.bags import read_trial, write_trial
 
 FIBRE = ["--fiber", "18Dec2017a"]
@@ -36,8 +36,8 @@ RUNS: Runs = {
         *(["--measured-only"] if less else ["--model", "3state_coop"]),
     ],
     "fit": lambda bags, out, less: [
-        "fit", str(bags), *FIBRE, "--out", str(out / "x.yaml"), "--starts", "1", "--processes", "0", "--free", "f",
-        *(["--no-intervals"] if less else ["k21"]), *([] if less else ["--no-intervals"]),
+        "fit", str(bags), *FIBRE, "--out", str(out / "x.yaml"), "--starts", "1", "--processes", "0", "--no-nuisance",
+        "--free", "f", *(["--no-intervals"] if less else ["k21"]), *([] if less else ["--no-intervals"]),
     ],
     "simulate": lambda bags, out, less: ["simulate", *FIBRE, "--out", str(out)],
 }  # fmt: skip
@@ -95,11 +95,11 @@ def test_a_replay_does_not_write_over_a_bag_that_is_of_no_replay(
 
 
 def test_a_diagnosis_names_what_is_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for name in ("diagnosis.json", "augmented.yaml", "report.html", "traces.npz", "journal.jsonl", "mine.html"):
+    own = {"diagnosis.json", "augmented.yaml", "augmented_18Dec2017a.yaml", "report.html", "traces.npz"}
+    for name in (*own, "journal.jsonl", "mine.html", "augmented.txt"):
         (tmp_path / name).write_text("{}")
-    (tmp_path / outcome.NEXT).mkdir()
-    names = {path.name for path in outcome.older_results(tmp_path)}
-    assert names == {"diagnosis.json", "augmented.yaml", "report.html", "traces.npz", outcome.NEXT}
+    (tmp_path / NEXT).mkdir()
+    assert {path.name for path in older_results(tmp_path)} == {*own, NEXT}
     assert main(["diagnose", "nowhere", *FIBRE, "--out", str(tmp_path)]) == 2
     assert "use --overwrite" in capsys.readouterr().err
 

@@ -12,8 +12,14 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.noise.cells import Residual
 from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
+from xb_muscle_ros.diagnose.search.descent import Fit
+from xb_muscle_ros.diagnose.search.explore import fitted
+from xb_muscle_ros.diagnose.search.system import System
+from xb_muscle_ros.diagnose.search.whole import whole
+from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
 from xb_muscle_ros.replay.made import coloured_noise
 from xb_muscle_ros.scores.noise.model import NoiseModel
 from xb_muscle_ros.scores.noise.trials import by_windows
@@ -22,6 +28,7 @@ from xb_muscle_ros.trials.protocol import StretchShortenStretch
 
 # Made evidence that several test modules share, and makers of bags that the tests of trials have.
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parent / "report"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "trials"))
 
 Array = npt.NDArray[np.float64]
@@ -109,3 +116,37 @@ def _model_of(windows: Sequence[Window]) -> NoiseModel:
 def model_of() -> Callable[[Sequence[Window]], NoiseModel]:
     """Makes the noise of a study of its windows."""
     return _model_of
+
+
+@pytest.fixture(scope="session")
+def gaussian_whole() -> Fibre:
+    """The whole model of `3state_coop` with everything absent: the one that the made studies compile."""
+    return whole(changed(load_fibre("18Dec2017a"), {"smoothing": 0.0}, "test"), ())
+
+
+@pytest.fixture(scope="session")
+def system() -> System:
+    """Two trials at other parameters and with a drag; no errors but noise."""
+    from made_trials import fitted_trials, given_fibre, trials_of, truth
+
+    trials = trials_of(truth("3state_coop+viscous_drag", drag=0.03), (4.5, 6.2), noise_f0=3e-4, ordinary=False)
+    return System.of(given_fibre(), fitted_trials(trials), 1e-3)
+
+
+def _fitted(system: System, *names: Name) -> Fit:
+    """From the fibre file's values and the catalogue's."""
+    found = fitted(system, names, [{}], 10, 0.02)
+    assert found is not None
+    return found
+
+
+@pytest.fixture(scope="session")
+def base_fit(system: System) -> Fit:
+    """Without the drag."""
+    return _fitted(system)
+
+
+@pytest.fixture(scope="session")
+def drag_fit(system: System) -> Fit:
+    """With it."""
+    return _fitted(system, Name.VISCOUS_DRAG)

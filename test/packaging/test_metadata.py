@@ -17,7 +17,8 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "xb_muscle_ros"
 
 # Where the name to import is not the name to install.
-PROVIDED_BY = {"yaml": "pyyaml"}
+# Numba brings its own llvmlite, of the one version that it goes with.
+PROVIDED_BY = {"yaml": "pyyaml", "llvmlite": "numba"}
 
 
 def normal(requirement: str) -> str:

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from xb_muscle_ros.prove.generator.fibres import nominal
 from xb_muscle_ros.prove.generator.world import Stimulus, World
+
+# Made records of diagnoses.
+sys.path.insert(0, str(Path(__file__).parents[1] / "diagnose" / "report"))
 
 
 def length_of_a_study(speed: float = 0.4545, amplitude: float = 0.0383) -> np.ndarray:

@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import sys
 import types
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
+from sample_diagnoses import nothing
 
 from xb_muscle_ros.cli.main import main
+from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
+from xb_muscle_ros.diagnose.result import Component, Diagnosis, Kind, Place, Verdict
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.prove.counting import interval, scores
 from xb_muscle_ros.prove.judging import judge
@@ -113,20 +117,40 @@ def benchmark_folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+def diagnosed(found: dict[str, Any]) -> Diagnosis:
+    """The record of what a tool says."""
+    plain, first = nothing().diagnosis, found["first_mismatch"]
+    named = [Name(name) for name in found["answer"]]
+    components = tuple(
+        Component(n.value, Kind.ARTEFACT if n in MEASUREMENT else Kind.MECHANISM, FAMILY[n], (n.value,), 0.8)
+        for n in named
+    )
+    held = {
+        when: replace(getattr(plain, when), heldout_rmsd_f0=found.get(f"{when}_heldout_f0"))
+        for when in ("before", "after")
+    }
+    place = first and Place("f", first["trial"], first["phase"], 0.1, 0.2, first["size_f0"], 0.01, 0.01)
+    return replace(
+        plain,
+        verdict=Verdict(found["verdict"]),
+        answer=tuple(n.value for n in named if n not in MEASUREMENT),
+        components=components,
+        mismatch=(place,) if place else (),
+        **held,
+    )
+
+
 def _tool(monkeypatch: pytest.MonkeyPatch, seen: list[str]) -> None:
     """A stand-in for the tool that knows the answers of `SAID`."""
 
     def diagnose_bags(
         bags: Any, fiber: Path, out: Path, quick: bool = False, seed: int = 1, report: bool = True
-    ) -> dict[str, Any]:
+    ) -> Diagnosis:
         name = fiber.parent.name
         seen.append(name)
         if name == "case_0010":
             raise UserError("no force")
-        found = SAID[name]
-        first = found["first_mismatch"]
-        held = {when: {"heldout_rmsd_f0": found.get(f"{when}_heldout_f0")} for when in ("before", "after")}
-        return {**found, **held, "mismatch": [] if first is None else [{**first, "p_value": 0.01}]}
+        return diagnosed(SAID[name])
 
     module = types.ModuleType("xb_muscle_ros.diagnose.run")
     module.diagnose_bags = diagnose_bags  # type: ignore[attr-defined]

@@ -42,17 +42,6 @@ class Name(str, enum.Enum):
     TRANSDUCER_LAG = "transducer_lag"
 
 
-class Verdict(str, enum.Enum):
-    """What a diagnosis says as a whole."""
-
-    NONE = "none"
-    MEASUREMENT = "measurement"
-    PARAMETERS = "parameters"
-    PHYSICS = "physics"
-    AMBIGUOUS = "ambiguous"
-    UNEXPLAINED = "unexplained"
-
-
 _FAMILIES: Mapping[str, tuple[Name, ...]] = {
     "parallel_viscoelasticity": (Name.VISCOUS_DRAG, Name.PASSIVE_VISCOELASTICITY),
     "weak_binding": (Name.WEAKLY_BOUND_HEADS, Name.FILAMENT_FRICTION),

@@ -141,8 +141,6 @@ def _does_without(explorer: Explorer) -> bool:
     Recordings that a Gaussian form made, say, do not have that error, and part of what was found only puts it back.
     """
     best = explorer.best()
-    if not best:
-        return False
     plain = Explorer([replace(s, closure_f0={}) for s in explorer.systems], explorer.effort, explorer.options)
     plain.fit([(best, [[f.values] for f in explorer.fits[best]])], "without closure")
     if best not in plain.fits:

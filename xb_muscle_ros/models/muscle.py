@@ -151,9 +151,10 @@ class Muscle:
     def _settled_quickly(self, state: Array, calcium_um: float, rates: Array) -> Array | None:
         """The state of rest by steps that need not be right on the way; None where they do not end at rest.
 
-        An L-stable method forgets the way it came: at rest its steps are Newton's.
+        An L-stable method forgets the way it came: at rest its steps are Newton's. Smooth functions have states of rest
+        besides the fibre's own, with hardly a head attached, which such steps may end in.
         """
-        if self._settling.step_s is not None:
+        if self._settling.step_s is not None or self.fibre.values["smoothing"] > 0.0:
             return None
         try:
             length = float(state[-3])

@@ -6,7 +6,8 @@ import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from xb_muscle_ros.diagnose.names import FAMILY, Name, Verdict
+from xb_muscle_ros.diagnose.names import FAMILY, Name
+from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.prove.calibration import Stated, calibration_score
 from xb_muscle_ros.prove.composite_judging import JudgedComposite, JudgedEffect, JudgedName
 from xb_muscle_ros.prove.counting import Score, median, share

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from xb_muscle_ros.diagnose.names import FAMILY, Name, Verdict
+from xb_muscle_ros.diagnose.names import FAMILY, Name
+from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.prove.judging import NO_DIAGNOSIS, heldout_gain
 from xb_muscle_ros.prove.stated import Statement, components, named
 

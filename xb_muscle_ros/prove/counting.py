@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.stats import binomtest
 
-from xb_muscle_ros.diagnose.names import Verdict
+from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.prove.judging import Judged
 
 SIZES = (0.0, 0.005, 0.01, 0.02, 0.04)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from xb_muscle_ros.diagnose.names import FAMILY, Name, Verdict
+from xb_muscle_ros.diagnose.names import FAMILY, Name
+from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.prove.stated import NAMES, family_of, first_names, named, probability_of
 
 # A global change of rates is what parameters are for: to call it so is right as well.

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from xb_muscle_ros.diagnose.names import FAMILY, MECHANISMS, Name, Verdict
+from xb_muscle_ros.diagnose.names import FAMILY, MECHANISMS, Name
+from xb_muscle_ros.diagnose.result import Verdict
 
 PHYSICS = frozenset(name.value for name in MECHANISMS)
 FAMILIES_OF_PHYSICS = tuple(dict.fromkeys(FAMILY[name] for name in MECHANISMS))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xb_muscle_ros.diagnose.inference.averaging import Averaged, averaged, grouped
-from xb_muscle_ros.diagnose.inference.calibration import calibrated
+from xb_muscle_ros.diagnose.inference.calibration import PRACTICAL_F0, calibrated
 from xb_muscle_ros.diagnose.inference.heldout import HeldOut
 from xb_muscle_ros.diagnose.inference.population import distribution
 from xb_muscle_ros.diagnose.inference.shares import unique
@@ -17,7 +17,7 @@ from xb_muscle_ros.diagnose.result import NAMED, SURE, Component, Kind, OfFibre,
 from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import Names, ordered
 from xb_muscle_ros.fit.coordinates import Coordinate
-from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.parameters import PARAMETERS
 
@@ -60,7 +60,10 @@ class Judged:
     def probability(self, group: Sequence[Name], fibre: int | None = None) -> float:
         """Inclusion probability of a component, by all fibres or by one."""
         averages = self.averages if fibre is None else self.of_fibres[fibre]
-        return calibrated(averages.log_odds(group), averages.contribution_f0(group))
+        # The base takes up ordinary errors, however large: what naming one gains is no residual, but its improbability.
+        ordinary = all(n.value in ORDINARY for n in group)
+        size_f0 = PRACTICAL_F0 if ordinary else averages.contribution_f0(group)
+        return calibrated(averages.log_odds(group), size_f0)
 
     @property
     def chosen(self) -> Names:

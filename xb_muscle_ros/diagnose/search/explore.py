@@ -26,6 +26,8 @@ Array = npt.NDArray[np.float64]
 _PRIOR_ODDS = {True: np.log(0.1), False: np.log(0.05)}
 # A set is worth going on from if the evidence rises by so much.
 _WORTH = 0.5
+# One step may cost so much evidence, in case the next one makes up for it.
+_PATIENCE = 3.0
 # Form errors of mechanisms: share of what a mechanism does that its form here gets wrong.
 FORM = 0.12
 # Of a set whose curvature cannot be told.
@@ -254,13 +256,19 @@ class Explorer:
         """Search; the set with the most evidence."""
         self.base()
         current: Names = ()
+        best, behind = current, 0
         for k in range(self.effort.steps):
             found = self.step(current, self.effort.candidates, blind=k < 2)
             self.refloor()
-            best = max(found, key=self.evidence, default=current)
-            if best == current or self.evidence(best) < self.evidence(current) + _WORTH:
+            ahead = max(found, key=self.evidence, default=current)
+            if ahead == current:
                 break
-            current = self._pruned(best)
+            # What two mechanisms do together may hide what each does: one step that gains nothing is taken.
+            behind = 0 if self.evidence(ahead) >= self.evidence(best) + _WORTH else behind + 1
+            if behind > 1 or self.evidence(ahead) < self.evidence(best) - _PATIENCE:
+                break
+            current = ahead if behind else self._pruned(ahead)
+            best = best if behind else current
         self.refloor()
         current = self.best()
         self._around(current)

@@ -143,7 +143,9 @@ def _of_artefact(linear: Linear, name: Name) -> Promise:
         mine = [j for j, c in enumerate(linear.descent.problem.coordinates) if c.name == name.value]
         own[mine] /= BEYOND**2
         moves, _, gain, mean_square = linear.solve(np.empty((linear.force.size, 0)), np.empty(0), np.empty(0), own)
-        return Promise(name, gain, (linear.values(moves),), mean_square)
+        # What the fit pays already for an error that is larger than ordinary.
+        released = 0.5 * (1.0 - BEYOND**-2.0) * float(np.sum(linear.point.prior[mine] ** 2))
+        return Promise(name, gain + released, (linear.values(moves),), mean_square)
     problem = system.problem((*fit.names, name), fit.values)
     mine = [j for j, c in enumerate(problem.coordinates) if c.name == name.value]
     columns, _ = Training(problem).slopes_by(problem.start, mine)
