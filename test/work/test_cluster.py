@@ -143,7 +143,11 @@ def test_a_cluster_with_another_package(tmp_path: Path, capsys: pytest.CaptureFi
     finally:
         other.close()
     said = capsys.readouterr().err
-    assert re.search(r"^xb_muscle: Dask worker tcp://\S+ has 2 threads, .* with --nthreads 1 --nworkers N\n$", said)
+    # Whether the first run meets it as well is a matter of when its worker started.
+    told = said.splitlines()
+    assert 1 <= len(told) <= 2
+    for line in told:
+        assert re.search(r"^xb_muscle: Dask worker tcp://\S+ has 2 threads, .* with --nthreads 1 --nworkers N$", line)
 
 
 def test_a_cluster_without_workers(
