@@ -54,7 +54,8 @@ class Stage:
                 stamp = message.header.stamp
                 heard.append((stamp.sec + stamp.nanosec * 1e-9, message.position[0]))
 
-            self.link.node.create_subscription(JointState, f"{space}/plant/joint", hear, 1000)
+            # While processes start and end nobody listens, for seconds of some thousand ticks each.
+            self.link.node.create_subscription(JointState, f"{space}/plant/joint", hear, 5000)
 
     def kill(self, name: str) -> None:
         """Without a warning."""
@@ -105,6 +106,8 @@ def test_lockstep_survives_the_death_of_either_side_and_namespaces_do_not_mix(st
         stage.until(lambda space=space: len(episodes(stage.joints[space])) >= 2)
     stage.kill("muscle/a")
     stage.until(lambda: "asking again" in stage.log("plant/a") or "waiting" in stage.log("plant/a"))
+    # What was said before its end may still be on its way.
+    stage.moves_on("/b")
     count = len(stage.joints["/a"])
     stage.moves_on("/b")
     assert len(stage.joints["/a"]) == count
