@@ -43,7 +43,7 @@ from xb_muscle_ros.work import Options, run
 Array = npt.NDArray[np.float64]
 
 FAULT_SDS = {"pca_shift": 0.05, "time_shift": 7e-4, "force_offset": 3e-3}
-# Residuals of 6 ms samples hang together over some 40 ms; 1.5 % F0 is a good fit's.
+# Residuals of 6 ms samples are autocorrelated over some 40 ms; 1.5 % F0 is a good fit's.
 SCALE = Scale(0.015, 6.0)
 # Time between samples given to the model, s, coarse and around corners (a time shift must not round them).
 COARSE_S, FINE_S, FINE_REACH = 0.004, 0.00075, 6

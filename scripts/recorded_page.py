@@ -107,7 +107,7 @@ def section(case: Case, d: Diagnosis, rows: Sequence[dict[str, Any]], images: st
         f"**{prose.headline(d)}**",
         " ".join(prose.summary(d)),
         f"Base `{d.model}`, {len(d.trials)} trials{many}, {effort}, {d.seconds:.0f} s. Verdict: {d.verdict.value}.",
-        "Components (share: of the base's mismatch that comes back without it; gain: mean logarithm of the ratio of "
+        "Components (share: ablation loss as a share of the base's mismatch; gain: mean logarithm of the ratio of "
         "held-out RMSD without and with it):\n\n" + components(d),
         "Each fibre:\n\n" + fibres(d) if many else "",
         "Where the base differs most:\n\n" + places(d.mismatch),

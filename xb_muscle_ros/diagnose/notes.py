@@ -98,7 +98,7 @@ def _inputs(given: Fibre, trials: Sequence[Trial]) -> Iterator[str]:
     elif still:
         yield f"length never moves in {_named(still)}"
     if len({t.facts.pca for t in trials}) == 1:
-        yield "all trials are at one pCa: errors of calcium and of calcium's effects cannot be told apart"
+        yield "all trials are at one pCa: errors of calcium and of calcium's effects cannot be separated"
     bare = [t.facts.trial for t in trials if not t.facts.phases]
     if bare:
         yield f"no phases are known or found of {_named(bare)}: a mismatch there is not located within the trial"

@@ -109,12 +109,12 @@ class Component:
     """Something that may be part of what the model lacks, or of what the recordings have wrong.
 
     Attributes:
-        name: of the mechanism or artefact, or of a family whose members cannot be told apart.
+        name: of the mechanism or artefact, or of a family whose members are not separable.
         kind: see `Kind`.
         family: of `names.FAMILY`.
         members: names in it, the likeliest first; a single name: itself.
         inclusion_probability: that it, or one of its members, is part of the truth.
-        share_of_mismatch: what of the base's mismatch comes back without it (0 where it is not part of the answer).
+        share_of_mismatch: ablation loss as a share of the base's mismatch (0 where it is not part of the answer).
         heldout_gain: what is lost without it on held-out conditions; None where it was not tried.
         parameters: of the likeliest member.
         direction: what it does to the force, in plain words; empty where it is not part of the answer.

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
+from xb_muscle_ros.diagnose.names import FAMILY, Name
 
 
 class Words(NamedTuple):
@@ -142,11 +142,6 @@ def family_of(name: str) -> str | None:
     """Family of a known name, else None."""
     known = {str(n.value): family for n, family in FAMILY.items()}
     return known.get(name)
-
-
-def is_fault(name: str) -> bool:
-    """Whether a name is a fault of the measurement."""
-    return name in {str(n.value) for n in MEASUREMENT}
 
 
 def phase_words(phase: str) -> str:

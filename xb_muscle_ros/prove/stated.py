@@ -20,7 +20,7 @@ class Statement(NamedTuple):
     """A component with its probability.
 
     Attributes:
-        name: of a mechanism or artefact, or of a family whose members cannot be told apart.
+        name: of a mechanism or artefact, or of a family whose members are not separable.
         family: whose it is.
         single: whether it is one name, and not a family of several.
         probability: that it is part of the truth; None in format 1, which has none for it.

@@ -176,7 +176,7 @@ def _at_bound(c: Coordinate, z: float) -> bool:
 
 
 def answer_of(found: Sequence[Component]) -> tuple[str, ...]:
-    """Mechanisms of the answer, best first: of a family that is not told apart its likeliest member."""
+    """Mechanisms of the answer, best first: of a family whose members are not separable its likeliest one."""
     return tuple(c.members[0] for c in found if c.kind is Kind.MECHANISM and c.inclusion_probability >= NAMED)
 
 

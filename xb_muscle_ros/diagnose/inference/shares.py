@@ -1,4 +1,4 @@
-"""How much of the mismatch a set explains, and what comes back without one of its names."""
+"""How much of the mismatch a set explains, and the ablation loss of each of its names."""
 
 from __future__ import annotations
 
