@@ -41,6 +41,13 @@ def add(subparsers: Subparsers) -> None:
         metavar="JSON",
         help="measured SRS and isometric force: predicted and compared, never fitted",
     )
+    parser.add_argument(
+        "--nuisance",
+        nargs="+",
+        default=[],
+        metavar="FAULT=SD",
+        help="SDs of ordinary measurement errors where the study knows better, such as time_shift=0.002 (s)",
+    )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for report and results")
     parser.add_argument("--quick", action="store_true", help="look less hard: minutes become tens of seconds")
     parser.add_argument("--seed", type=int, default=1, help="of the bootstrap (default 1)")
@@ -51,6 +58,7 @@ def add(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, print the answer, say where the report is."""
+    from xb_muscle_ros.diagnose.error_sds import error_sds_of
     from xb_muscle_ros.diagnose.outputs import older_results
     from xb_muscle_ros.diagnose.report.terminal import terminal_text
     from xb_muscle_ros.diagnose.run import diagnose_bags
@@ -71,6 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
         only=arguments.trials_of,
         features=arguments.features,
         predict=arguments.predict,
+        error_sds=error_sds_of(arguments.nuisance),
     )
     print(terminal_text(found))
     for name in ("report.html", "diagnosis.json", *found.augmented.values()):

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 from xb_muscle_ros.diagnose.effort import QUICK, Effort
 from xb_muscle_ros.diagnose.feature_tables import FeatureTable, read_features
 from xb_muscle_ros.diagnose.featuring import with_features
+from xb_muscle_ros.diagnose.error_sds import told_of
 from xb_muscle_ros.diagnose.intake import FibreStudy, read_fibres
 from xb_muscle_ros.diagnose.outputs import Files, write
 from xb_muscle_ros.diagnose.recording import recorded
@@ -33,6 +35,7 @@ def diagnose_bags(
     only: str | None = None,
     features: Path | None = None,
     predict: Path | None = None,
+    error_sds: Mapping[str, float] = MappingProxyType({}),
 ) -> Diagnosis:
     """Diagnose the trials of some bags and write what was found.
 
@@ -50,6 +53,7 @@ def diagnose_bags(
         only: with one fibre: take trials of this fibre and no other.
         features: table of measured SRS and isometric force to be met beside the traces.
         predict: table of measured SRS and isometric force to be predicted, never fitted.
+        error_sds: standard deviations of ordinary measurement errors that are not those of the table, by name.
 
     Raises:
         UserError: bags that cannot be read or do not belong together, no force, no solution at the start.
@@ -60,7 +64,7 @@ def diagnose_bags(
     data, table = (None if path is None else read_features(path, trials) for path in (features, predict))
     options = options or Options(processes=0, quiet=True)
     options = replace(options, journal=options.journal or out / "journal.jsonl")
-    found, made = diagnose(studies, QUICK if quick else Effort(), seed, options, data, table)
+    found, made = diagnose(studies, QUICK if quick else Effort(), seed, options, data, table, error_sds)
     write(out, found, made, report)
     return found
 
@@ -72,6 +76,7 @@ def diagnose(
     options: Options,
     data: FeatureTable | None = None,
     table: FeatureTable | None = None,
+    error_sds: Mapping[str, float] = MappingProxyType({}),
 ) -> tuple[Diagnosis, Files]:
     """Diagnose a study of one fibre or of several.
 
@@ -82,6 +87,7 @@ def diagnose(
         options: where work is done.
         data: features to be met beside the traces.
         table: features to be predicted, never fitted.
+        error_sds: see `diagnose_bags`.
 
     Returns:
         what was found, and what goes into files beside it.
@@ -90,8 +96,10 @@ def diagnose(
         UserError: see `diagnose_bags`.
     """
     begun = time.monotonic()
-    study = searched(studies, effort, seed, options, {} if data is None else data.features)
+    told = told_of(error_sds)
+    study = searched(studies, effort, seed, options, {} if data is None else data.features, error_sds)
     found, made = recorded(study, effort, seed)
+    found = replace(found, notes=(*found.notes, *told))
     if data is not None:
         found = replace(found, notes=(*found.notes, *data.told))
     if table is not None:

@@ -73,8 +73,17 @@ def searched(
     seed: int,
     options: Options,
     features: Mapping[str, tuple[Feature, ...]] = MappingProxyType({}),
+    error_sds: Mapping[str, float] = MappingProxyType({}),
 ) -> Searched:
     """Search a study.
+
+    Args:
+        studies: fibres with their trials.
+        effort: how hard to look.
+        seed: of the bootstrap.
+        options: where work is done.
+        features: to be met beside the traces, by fibre.
+        error_sds: of ordinary measurement errors, in place of those of `measurement.faults.FAULTS`.
 
     Raises:
         UserError: no solution at the start, or a force that cannot be looked at.
@@ -89,9 +98,9 @@ def searched(
         trials = fit_trials(study.trials, [False] * len(study.trials), whole=True)
         recording = Recordings(study.trials, noise_of(study.trials), effort.draws, seed)
         floor = max(FLOOR_F0, recording.usual_noise_f0())
-        systems.append(replace(System.of(fibre, trials, floor), features=features.get(fibre.name, ())))
+        systems.append(replace(System.of(fibre, trials, floor), features=features.get(fibre.name, ()), error_sds=error_sds))
         weights = np.ones(sum(t.measured_f0.size for t in trials))
-        recorded.append(System(fibre, trials, weights, floor))
+        recorded.append(System(fibre, trials, weights, floor, error_sds=error_sds))
         fibres.append(fibre)
         recordings.append(recording)
     compile_first(fibres, options)

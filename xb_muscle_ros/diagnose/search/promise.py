@@ -13,7 +13,7 @@ from xb_muscle_ros.diagnose.search.system import BEYOND, System
 from xb_muscle_ros.diagnose.search.whole import FRAMES
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.training import Training
-from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
+from xb_muscle_ros.measurement.faults import ORDINARY
 from xb_muscle_ros.models.catalogue import CATALOGUE
 
 Array = npt.NDArray[np.float64]
@@ -149,7 +149,7 @@ def _of_artefact(linear: Linear, name: Name) -> Promise:
     problem = system.problem((*fit.names, name), fit.values)
     mine = [j for j, c in enumerate(problem.coordinates) if c.name == name.value]
     columns, _ = Training(problem).slopes_by(problem.start, mine)
-    information = np.full(len(mine), (BEYOND * FAULTS[name.value].sd) ** -2.0)
+    information = np.full(len(mine), (BEYOND * system.error_sd(name.value)) ** -2.0)
     moves, found, gain, mean_square = linear.solve(columns, information, np.zeros(len(mine)))
     values = {problem.coordinates[j].label: float(v) for j, v in zip(mine, found, strict=True)}
     return Promise(name, gain, ({**linear.values(moves), **values},), mean_square)

@@ -51,6 +51,7 @@ class System:
         noise_f0: standard deviation that a residual has at least, noise and numerics, F0.
         closure_f0: what the Gaussian form leaves out of the distribution's force at the thinned times, by trial.
         features: isometric forces and SRS to be met beside the traces.
+        error_sds: standard deviations of ordinary measurement errors that replace those of the table, by name.
     """
 
     fibre: Fibre
@@ -59,6 +60,7 @@ class System:
     noise_f0: float
     closure_f0: Mapping[str, Array] = field(default_factory=dict)
     features: tuple[Feature, ...] = ()
+    error_sds: Mapping[str, float] = field(default_factory=dict)
 
     @staticmethod
     def of(fibre: Fibre, trials: Sequence[FitTrial], noise_f0: float) -> System:
@@ -119,11 +121,15 @@ class System:
             )
         return Problem(fibre, self.trials, merged, {}, self.features, correction)
 
+    def error_sd(self, name: str) -> float:
+        """Standard deviation of an ordinary measurement error, in its unit."""
+        return self.error_sds.get(name, FAULTS[name].sd)
+
     def _artefacts(self, names: Names) -> list[Coordinate]:
         """Ordinary measurement errors, wider where named, and those that are in a set only."""
         named = {n.value for n in names if n in MEASUREMENT}
         wanted = [n for n in FAULTS if n in ORDINARY or n in named]
-        sds = {n: BEYOND * FAULTS[n].sd for n in named}
+        sds = {**self.error_sds, **{n: BEYOND * self.error_sd(n) for n in named}}
         trials, solutions = [t.name for t in self.trials], [t.solution for t in self.trials]
         return list(fault_coordinates(wanted, trials, solutions, sds))
 
@@ -134,6 +140,7 @@ class System:
             "weights": self.weights.tolist(),
             "noise_f0": self.noise_f0,
             "closure_f0": {name: values.tolist() for name, values in self.closure_f0.items()},
+            "error_sds": dict(self.error_sds),
         }
 
     @staticmethod
@@ -142,7 +149,9 @@ class System:
         problem = Problem.from_json(row["problem"])
         closure = {name: np.array(values, dtype=np.float64) for name, values in row["closure_f0"].items()}
         weights = np.array(row["weights"])
-        return System(problem.fibre, problem.trials, weights, row["noise_f0"], closure, problem.features)
+        return System(
+            problem.fibre, problem.trials, weights, row["noise_f0"], closure, problem.features, row["error_sds"]
+        )
 
 
 def _usual(parameter: str) -> float:

@@ -36,6 +36,9 @@ _WK, _WR, _WX, _WL = (int(i) for i in (At.WEAK_STIFFNESS, At.WEAK_RATE, At.WEAK_
 _CC, _CT, _UK = (int(i) for i in (At.CREEP, At.CREEP_TIME, At.UNIT_STIFFNESS))
 _REGULATED = int(Thick.FORCE_DEPENDENT)
 
+# Heads attach within so many widths of the profile; fewer heads than this in a bin are rounding's.
+_FARTHEST_WIDTHS, _NOBODY = 80.0**0.5, 1e-40
+
 # Rows of a half-sarcomere's state.
 N_ON, DRX, TORN, LENGTH, OFFSET, WEAK_SITES, WEAK_FORCE, Q0, FORCE, LAST_MOVE = range(10)
 ROWS = 10
@@ -47,11 +50,30 @@ CALCIUM, ATTACHMENT, SWITCH_OFF, RECRUITMENT = range(4)
 
 
 @compiled
+def _occupied(n: Array, shift: float, x0: float, dx: float, p: Array) -> tuple[int, int]:
+    """Bins outside of which no head is and none attaches: the first, and the one behind the last; the others empty."""
+    reach = _FARTHEST_WIDTHS * p[_W]
+    first = max(0, int((-reach - shift - x0) / dx) - 1)
+    last = min(n.size, int((reach - shift - x0) / dx) + 2)
+    first, last = min(first, n.size), max(last, 0)
+    for i in range(first):
+        if n[i] > _NOBODY:
+            first = i
+            break
+        n[i] = 0.0
+    for i in range(n.size - 1, last - 1, -1):
+        if n[i] > _NOBODY:
+            last = i + 1
+            break
+        n[i] = 0.0
+    return first, max(first, last)
+
+
+@compiled
 def _heads(
     n: Array, unit: Array, move: float, factor: float, h: float, x0: float, dx: float, p: Array, work: Array
 ) -> None:
     """Attachment and detachment over h at strains half-way through the step; updates heads, ready and torn heads."""
-    bins = n.size
     shift = unit[OFFSET] + move
     slow, fast = p[_K11] * np.exp(-p[_K12] * shift), p[_K21] * np.exp(p[_K22] * shift)
     length = unit[LENGTH] + move
@@ -64,8 +86,9 @@ def _heads(
     half_q0, torn_rate = 0.0, 0.0
     norm = 1.0 / (p[_W] * np.sqrt(2.0 * np.pi))
     total_weight = 0.0
+    first, last = _occupied(n, shift, x0, dx, p)
     # Rows of work: rate, exp(-rate h/2), attachment profile, tearing rate, tables of both exponentials.
-    for i in range(bins):
+    for i in range(first, last):
         x = x0 + i * dx + shift
         rate = slow * work[4, i] + fast * work[5, i]
         if p[_PI] > 0.0:
@@ -74,18 +97,18 @@ def _heads(
             work[3, i] = p[_TK] / (1.0 + np.exp(-p[_TS] * (x - p[_TX])))
             rate += work[3, i]
         y = x / p[_W]
-        work[2, i] = norm * np.exp(-0.5 * y * y) if y * y < 80.0 else 0.0
+        work[2, i] = norm * np.exp(-0.5 * y * y) if y * y < _FARTHEST_WIDTHS**2 else 0.0
         total_weight += work[2, i]
         work[0, i] = rate
         work[1, i] = np.exp(-0.5 * rate * h)
     total_weight *= dx
     if tears:
-        for i in range(bins):
+        for i in range(first, last):
             torn_rate += work[3, i] * n[i]
         torn_rate *= dx
         decay = np.exp(-0.5 * p[_TB] * h)
         rebound_rate = p[_TB] * (rebound * decay + torn_rate * (1.0 - decay) / p[_TB])
-    for i in range(bins):
+    for i in range(first, last):
         left = work[1, i]
         half_q0 += n[i] * left + work[2, i] * (source + rebound_rate) * (1.0 - left) / work[0, i]
     half_q0 *= dx
@@ -100,7 +123,7 @@ def _heads(
         rebound_rate = (rebound * (1.0 - decay) + torn_rate * (h - (1.0 - decay) / p[_TB])) / h
     new_q0, torn = 0.0, 0.0
     gain = source + rebound_rate
-    for i in range(bins):
+    for i in range(first, last):
         left = work[1, i] * work[1, i]
         before = n[i]
         n[i] = before * left + work[2, i] * gain * (1.0 - left) / work[0, i]
