@@ -41,6 +41,10 @@ def told_of(error_sds: Mapping[str, float]) -> list[str]:
         row = FAULTS[name]
         unit = "" if row.unit == "1" else f" {row.unit}"
         if not 0.0 < sd <= row.upper:
-            raise UserError(f"ordinary measurement error '{name}': SD {sd:g}{unit}; allowed is above 0 up to {row.upper:g}{unit}")
-        lines.append(f"ordinary measurement error '{name}' has SD {sd:g}{unit}, as was asked (usually {row.sd:g}{unit})")
+            raise UserError(
+                f"ordinary measurement error '{name}': SD {sd:g}{unit}; allowed is above 0 up to {row.upper:g}{unit}"
+            )
+        lines.append(
+            f"ordinary measurement error '{name}' has SD {sd:g}{unit}, as was asked (usually {row.sd:g}{unit})"
+        )
     return lines

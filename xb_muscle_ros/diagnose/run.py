@@ -9,9 +9,9 @@ from pathlib import Path
 from types import MappingProxyType
 
 from xb_muscle_ros.diagnose.effort import QUICK, Effort
+from xb_muscle_ros.diagnose.error_sds import told_of
 from xb_muscle_ros.diagnose.feature_tables import FeatureTable, read_features
 from xb_muscle_ros.diagnose.featuring import with_features
-from xb_muscle_ros.diagnose.error_sds import told_of
 from xb_muscle_ros.diagnose.intake import FibreStudy, read_fibres
 from xb_muscle_ros.diagnose.outputs import Files, write
 from xb_muscle_ros.diagnose.recording import recorded

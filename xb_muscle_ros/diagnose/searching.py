@@ -98,7 +98,9 @@ def searched(
         trials = fit_trials(study.trials, [False] * len(study.trials), whole=True)
         recording = Recordings(study.trials, noise_of(study.trials), effort.draws, seed)
         floor = max(FLOOR_F0, recording.usual_noise_f0())
-        systems.append(replace(System.of(fibre, trials, floor), features=features.get(fibre.name, ()), error_sds=error_sds))
+        systems.append(
+            replace(System.of(fibre, trials, floor), features=features.get(fibre.name, ()), error_sds=error_sds)
+        )
         weights = np.ones(sum(t.measured_f0.size for t in trials))
         recorded.append(System(fibre, trials, weights, floor, error_sds=error_sds))
         fibres.append(fibre)

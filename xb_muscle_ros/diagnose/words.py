@@ -32,7 +32,7 @@ _WORDS: Mapping[Name, Words] = {
     ),
     Name.FILAMENT_FRICTION: Words(
         "friction of bound heads",
-        "bound heads are elastic for a short way and then slide at a constant force, however fast the stretch",
+        "links that bound heads make are elastic for a short way, slip, and take time to form anew",
     ),
     Name.ACTIVE_TITIN: Words(
         "active titin", "a spring that engages when the fibre is activated and is stretched from there on"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -43,6 +43,9 @@ class Problem:
     ties: Mapping[str, str]
     features: tuple[Feature, ...] = ()
     correction: Correction | None = None
+    _places: dict[tuple[str, str], tuple[tuple[str, int], ...]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     @property
     def start(self) -> Array:
@@ -67,11 +70,15 @@ class Problem:
 
     def faults_at(self, z: Array, trial: FitTrial) -> dict[str, float]:
         """Faults of a trial at a point; those of a solution or trial that was not fitted are 0."""
-        return {
-            c.name: float(moved)
-            for c, moved in zip(self.coordinates, z, strict=True)
-            if c.group is not None and touches(c, trial)
-        }
+        return {name: float(z[j]) for name, j in self._faults_of(trial.name, trial.solution)}
+
+    def _faults_of(self, trial: str, solution: str) -> tuple[tuple[str, int], ...]:
+        """Names and places of the faults that bear on a trial; asked for at every point of a fit, so remembered."""
+        key = (trial, solution)
+        if key not in self._places:
+            named = [(j, c) for j, c in enumerate(self.coordinates) if c.group is not None]
+            self._places[key] = tuple((c.name, j) for j, c in named if _bears_on(c, trial, solution))
+        return self._places[key]
 
     def true_forces(self, muscle: Muscle, z: Array, trials: Sequence[FitTrial]) -> list[Array]:
         """The fibre's force at the samples of trials, F0, before the recording's faults.
@@ -159,8 +166,11 @@ def touches(c: Coordinate, trial: FitTrial) -> bool:
     """Whether a coordinate bears on a trial."""
     if c.group is None:
         return True
-    scope = FAULTS[c.name].scope
-    return c.group == {Scope.TRIAL: trial.name, Scope.SOLUTION: trial.solution, Scope.STUDY: ""}[scope]
+    return _bears_on(c, trial.name, trial.solution)
+
+
+def _bears_on(fault: Coordinate, trial: str, solution: str) -> bool:
+    return fault.group == {Scope.TRIAL: trial, Scope.SOLUTION: solution, Scope.STUDY: ""}[FAULTS[fault.name].scope]
 
 
 def moves_simulation(c: Coordinate) -> bool:

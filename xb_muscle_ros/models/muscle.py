@@ -158,7 +158,9 @@ class Muscle:
             return None
         try:
             length = float(state[-3])
-            found = self._advance(state, length, calcium_um, _LONGEST_SETTLING_S, 1e-6, _ON_THE_WAY)
+            # A step that is a tiny share of what is to come counts as stuck, so the first second goes by itself.
+            found = self._advance(state, length, calcium_um, 1.0, 1e-6, _ON_THE_WAY)
+            found = self._advance(found, length, calcium_um, _LONGEST_SETTLING_S, 0.1, _ON_THE_WAY)
             # The last step was long, so what it has left of an error is gone after one more.
             found = self._advance(found, length, calcium_um, _LONGEST_SETTLING_S, _LONGEST_SETTLING_S, _ON_THE_WAY)
         except UserError:

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
 
+from xb_muscle_ros.prove.generator.pieces import compiled
 from xb_muscle_ros.prove.generator.world import SAMPLE_S, Stimulus
 
 Array = npt.NDArray[np.float64]
@@ -46,20 +47,38 @@ def power_law_relaxation(length: Array, stiffness: float, exponent: float, steep
     return stiffness * total
 
 
+@compiled
 def slipping_friction(length: Array, way: float, unevenness: float, release_s: float) -> Array:
-    """Springs that each hold up to their own way and slip beyond (Iwan 1966), over their sum's largest force; (n,).
+    """Links that are elastic, slip at their way and form anew, over the force of all of them at the way; shape (n,).
+
+    Links are cohorts by the sample at which they formed, each on a spring from the length of then. The strains at which
+    the links of a cohort slip have a Weibull distribution.
 
     Args:
-        way: at which the middle one slips, L0.
-        unevenness: SD of the ways' logarithms.
-        release_s: time constant with which held springs let go.
+        way: at which all but 1/e of the links have slipped, L0.
+        unevenness: inverse of the distribution's shape.
+        release_s: time constant with which links let go, and with which free ones form.
     """
-    ways = way * np.exp(unevenness * np.array([-1.4, -0.5, 0.0, 0.5, 1.4]))
-    moved = np.diff(length, prepend=length[0])
-    left, held, total = np.exp(-SAMPLE_S / release_s), np.zeros(ways.size), np.zeros(length.size)
-    for k in range(length.size):
-        held = np.clip(left * held + moved[k] / ways, -1.0, 1.0)
-        total[k] = np.mean(held)
+    n = length.size
+    cohorts, total = np.zeros(n), np.zeros(n)
+    cohorts[0], free, oldest = 1.0, 0.0, 0
+    left = np.exp(-SAMPLE_S / release_s)
+    for k in range(1, n):
+        force, lost = 0.0, 0.0
+        for j in range(oldest, k):
+            strain, before, kept = (length[k] - length[j]) / way, (length[k - 1] - length[j]) / way, left
+            if abs(strain) > abs(before):
+                kept *= np.exp(abs(before) ** (1.0 / unevenness) - abs(strain) ** (1.0 / unevenness))
+            lost += cohorts[j] * (1.0 - kept)
+            cohorts[j] *= kept
+            force += cohorts[j] * strain
+        while oldest < k - 1 and cohorts[oldest] < 1e-9:
+            free += cohorts[oldest]
+            oldest += 1
+        formed = (free + lost) * (1.0 - left)
+        free += lost - formed
+        cohorts[k] = formed
+        total[k] = force
     return total
 
 

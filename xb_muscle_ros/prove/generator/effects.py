@@ -246,8 +246,8 @@ _ROWS = (
         _set(At.WEAK_STIFFNESS, rate=At.WEAK_RATE, strain=At.WEAK_STRAIN, lag=At.WEAK_LAG),
     ),
     Effect(
-        Name.FILAMENT_FRICTION.value, "friction if all heads were bound, F0", _ALL, 0.2, 1.5,
-        _between(way=(0.004, 0.02), unevenness=(0.1, 0.5), release_s=(0.02, 0.5)), _slipping,
+        Name.FILAMENT_FRICTION.value, "friction if all heads were bound, F0", _ALL, 0.5, 4.0,
+        _between(way=(0.004, 0.02), unevenness=(0.1, 0.4), release_s=(0.01, 0.3)), _slipping,
     ),
     Effect(
         Name.ACTIVE_TITIN.value, "stiffness when bound, F0/L0", _ALL, 2.0, 20.0,
