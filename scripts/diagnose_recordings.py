@@ -155,7 +155,7 @@ def diagnose_shown(
         )
         studies.append(FibreStudy(start, own, ()))
     table = None if features is None else read_features(features, {s.fibre.name: s.trials for s in studies})
-    found, made = diagnose(studies, QUICK if quick else Effort(), 1, options, table=table)
+    found, made = diagnose(studies, QUICK if quick else Effort(), 1, options, table=table, error_sds=case.error_sds)
     write(folder, found, made)
 
 
