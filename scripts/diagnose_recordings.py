@@ -123,7 +123,7 @@ def run_case(
     bases = [base_fibre(load_fibre(folder / _file("start", name, d)), d) for name in d.fibres]
     for base in bases:
         write_fibre(folder / _file("base", base.name, d), base, ["The base of the diagnosis beside it, as fitted."])
-    rows, arrays = predictions(d, folder, bases, concealed)
+    rows, arrays = predictions(d, folder, bases, concealed, case.alike)
     for row in rows:
         row["warned"] = warned_beforehand(d, row["fibre"])
     with replaced(folder / "predictions.npz") as temporary, temporary.open("wb") as file:

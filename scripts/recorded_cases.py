@@ -52,6 +52,7 @@ class Case:
         pooled: key of the study of many fibres of which this is one by itself; empty for others.
         features: whether a table has SRS and isometric force of its fibres, which are predicted as well.
         error_sds: of ordinary measurement errors, where the recordings' own description knows better.
+        alike: concealed trials were recorded as the shown ones were, so that they share errors of the whole set.
     """
 
     key: str
@@ -66,6 +67,7 @@ class Case:
     pooled: str = ""
     features: bool = False
     error_sds: Mapping[str, float] = field(default_factory=dict)
+    alike: bool = True
 
 
 def released(model: str) -> Callable[[Sequence[Trial]], Fibre]:
@@ -129,12 +131,12 @@ def _pooled(model: str) -> Case:
     about = f"""Shown: five fibres at the paper's two fitted protocols and 3 to 5 pCa, every 6 ms, diagnosed as one
 study. Concealed: the 1 kHz recordings of fibre {RAT_SOLEUS} (RT 1 ms at five pCa, triangles). {_BASES[model]} The
 start is the released set of each fibre. Lengths were put in place to 2 ms, so the time shift has an SD of 2 ms. Whole
-solutions are left out in turn within the study, so that its held-out errors are those of a pCa that the fit did not see."""
+solutions are left out in turn, so that the study's held-out errors are those of a pCa that the fit did not see."""
     title = f"Five rat soleus fibres, base `{model}`"
     imports = (*_of_fibres(*FIBRES), *_KILOHERTZ)
     return Case(
         f"fibres_{model}", title, about, imports, _SIX_MS, _UNSEEN, released(model), False, features=True,
-        error_sds=_PLACED,
+        error_sds=_PLACED, alike=False,
     )  # fmt: skip
 
 
@@ -155,6 +157,7 @@ def _single(name: str, model: str) -> Case:
         pooled=f"fibres_{model}",
         features=True,
         error_sds=_PLACED,
+        alike=False,
     )
 
 

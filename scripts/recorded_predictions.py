@@ -1,8 +1,8 @@
 """Concealed trials as two fibre files predict them: the fitted base, and the answer's augmented fibre.
 
 A prediction has nothing of the concealed trial but what its own force tells before anything moves: its solution's pCa
-shift and its force offset (`fit.calibration`). Measurement errors that the study shares (time shift, length gain) are
-those of its recordings and have no part in it.
+shift and its force offset (`fit.calibration`). Measurement errors that a study shares (time shift, length gain) are
+taken as the study has them where concealed trials were recorded as the shown ones were, and have no part elsewhere.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ Array = npt.NDArray[np.float64]
 
 # Faults that a trial's force tells before anything moves.
 _OWN = ("pca_shift", "force_offset")
+# Faults of a whole set of recordings; of run-down the order of all trials would have to be known.
+_SHARED = ("length_gain", "time_shift", "transducer_lag")
 # What is averaged at the end of a trial, s.
 END_S = 0.5
 
@@ -46,18 +48,24 @@ def base_fibre(start: Fibre, d: Diagnosis) -> Fibre:
     return by_distribution(made) if row.closure_f0 and has_closure(made) else made
 
 
-def predicted(fibre: Fibre, trial: FitTrial) -> Calibrated | None:
+def predicted(fibre: Fibre, trial: FitTrial, shared: Mapping[str, float]) -> Calibrated | None:
     """Recorded force of a trial, F0, and the errors of its own that it was given; None where there is no solution."""
-    coordinates = fault_coordinates(_OWN, [trial.name], [trial.solution], {})
+    coordinates = fault_coordinates((*_OWN, *shared), [trial.name], [trial.solution], {})
     problem = Problem(fibre, (trial,), coordinates, {})
     try:
-        return calibrated_force(problem, np.zeros(len(coordinates)), trial, known=False)
+        return calibrated_force(problem, np.array([shared.get(c.name, 0.0) for c in coordinates]), trial, known=False)
     except UserError:
         return None
 
 
+def shared_errors(d: Diagnosis, fibre: str, model: str) -> dict[str, float]:
+    """Errors that all recordings of a fibre share, by name, with one of the models ``before`` and ``after``."""
+    own = [row for row in d.nuisances if row.fibre == fibre and row.name in _SHARED]
+    return {row.name: (row.before or 0.0) if model == "before" else row.value for row in own}
+
+
 def predictions(
-    d: Diagnosis, folder: Path, bases: Sequence[Fibre], concealed: Mapping[str, Sequence[Trial]]
+    d: Diagnosis, folder: Path, bases: Sequence[Fibre], concealed: Mapping[str, Sequence[Trial]], alike: bool
 ) -> tuple[list[dict[str, Any]], dict[str, Array]]:
     """A row for every concealed trial, and its forces.
 
@@ -66,6 +74,7 @@ def predictions(
         folder: with its augmented fibre files.
         bases: fitted base of each fibre.
         concealed: trials by what they test.
+        alike: they were recorded as the shown ones were.
 
     Returns:
         rows with RMSD (F0; None: no solution), errors of the trial's own and mean force in the last `END_S` by model;
@@ -87,7 +96,7 @@ def predictions(
         }  # fmt: skip
         arrays |= {f"p{k}_time_s": trial.force_time_s, f"p{k}_measured_f0": trial.measured_f0}
         for name, fibre in models.items():
-            found = predicted(fibre, trial)
+            found = predicted(fibre, trial, shared_errors(d, base.name, name) if alike else {})
             force = np.full(trial.measured_f0.size, np.nan) if found is None else found.force_f0
             arrays[f"p{k}_{name}_f0"] = force
             left = float(np.sqrt(np.mean((force - trial.measured_f0) ** 2)))

@@ -244,6 +244,7 @@ class Nuisance:
         value: estimate with the answer's model.
         sd: standard error.
         prior_sd: what is ordinary.
+        before: estimate with the base; None where the base does not have it.
     """
 
     fibre: str
@@ -253,6 +254,7 @@ class Nuisance:
     value: float
     sd: float | None
     prior_sd: float
+    before: float | None = None
 
 
 @dataclass(frozen=True)

@@ -121,16 +121,17 @@ def of_trials(study: Searched, chosen: Names, traces: Sequence[Traced]) -> tuple
 
 
 def nuisances(study: Searched, chosen: Names) -> tuple[Nuisance, ...]:
-    """Measurement errors as estimated beside the answer."""
+    """Measurement errors as estimated beside the answer and the base."""
     rows = []
     for i, system in enumerate(study.explorer.systems):
-        fit = study.explorer.fits[chosen][i]
+        fit, base = study.explorer.fits[chosen][i], study.explorer.fits[()][i]
         for c in system.problem(chosen, fit.values).coordinates:
             if c.group is not None:
                 rows.append(
                     Nuisance(
                         fibre=study.fibres[i].name, name=c.name, group=c.group, unit=FAULTS[c.name].unit,
                         value=fit.values[c.label], sd=fit.sds[c.label], prior_sd=c.prior_sd,
+                        before=base.values.get(c.label),
                     )
                 )  # fmt: skip
     return tuple(rows)
