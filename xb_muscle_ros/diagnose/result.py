@@ -120,6 +120,8 @@ class Component:
         direction: what it does to the force, in plain words; empty where it is not part of the answer.
         not_separable_from: names of other components with which it trades probability.
         by_fibre: one row for each fibre, also where there is one.
+        log_odds: of averaging over sets, before calibration; within ±50.
+        contribution_f0: root of what it takes off the mean square of the best set without its family, F0.
     """
 
     name: str
@@ -133,6 +135,8 @@ class Component:
     direction: str = ""
     not_separable_from: tuple[str, ...] = ()
     by_fibre: tuple[OfFibre, ...] = ()
+    log_odds: float = 0.0
+    contribution_f0: float = 0.0
 
 
 @dataclass(frozen=True)

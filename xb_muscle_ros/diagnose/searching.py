@@ -67,15 +67,36 @@ def around(explorer: Explorer, recorded: System, names: Names, i: int) -> Around
     return Around.of(recorded, explorer.fits[names][i], TOLD * float(np.sum(explorer.systems[i].weights)))
 
 
-def searched(
+@dataclass(frozen=True)
+class Begun:
+    """A study before its search: the base is fitted, and the Gaussian form's own error taken out.
+
+    Attributes:
+        fibres, recorded, recordings, lines: see `Searched`.
+        explorer: with the base's fit.
+    """
+
+    fibres: tuple[Fibre, ...]
+    recorded: tuple[System, ...]
+    recordings: tuple[Recordings, ...]
+    explorer: Explorer
+    lines: tuple[str, ...]
+
+    def significance(self) -> tuple[Significance, ...]:
+        """Of what the base leaves in each fibre."""
+        pairs = enumerate(zip(self.recordings, self.recorded, strict=True))
+        return tuple(r.significance(around(self.explorer, s, (), i)) for i, (r, s) in pairs)
+
+
+def begun(
     studies: Sequence[FibreStudy],
     effort: Effort,
     seed: int,
     options: Options,
     features: Mapping[str, tuple[Feature, ...]] = MappingProxyType({}),
     error_sds: Mapping[str, float] = MappingProxyType({}),
-) -> Searched:
-    """Search a study.
+) -> Begun:
+    """Fit the base of a study.
 
     Args:
         studies: fibres with their trials.
@@ -86,7 +107,7 @@ def searched(
         error_sds: of ordinary measurement errors, in place of those of `measurement.faults.FAULTS`.
 
     Raises:
-        UserError: no solution at the start, or a force that cannot be looked at.
+        UserError: no solution at the start.
     """
     lines, fibres, recorded, recordings, systems = [], [], [], [], []
     for study in studies:
@@ -111,25 +132,39 @@ def searched(
         options = replace(options, processes=0)
     explorer = Explorer(systems, effort.search, options)
     explorer.base()
-    base = [
-        r.significance(around(explorer, s, (), i)) for i, (r, s) in enumerate(zip(recordings, recorded, strict=True))
-    ]
-    if any(found.detected(ALPHA) for found in base):
-        recorded = _closed(explorer, recorded)
+    made = Begun(tuple(fibres), tuple(recorded), tuple(recordings), explorer, tuple(lines))
+    if any(found.detected(ALPHA) for found in made.significance()):
+        made = replace(made, recorded=tuple(_closed(explorer, recorded)))
+    return made
+
+
+def searched(
+    studies: Sequence[FibreStudy],
+    effort: Effort,
+    seed: int,
+    options: Options,
+    features: Mapping[str, tuple[Feature, ...]] = MappingProxyType({}),
+    error_sds: Mapping[str, float] = MappingProxyType({}),
+) -> Searched:
+    """Search a study; arguments as `begun` has them.
+
+    Raises:
+        UserError: no solution at the start, or a force that cannot be looked at.
+    """
+    study = begun(studies, effort, seed, options, features, error_sds)
+    explorer = study.explorer
     explorer.explore()
     if any(s.closure_f0 for s in explorer.systems) and _does_without(explorer):
-        recorded = [replace(s, closure_f0={}) for s in recorded]
+        study = replace(study, recorded=tuple(replace(s, closure_f0={}) for s in study.recorded))
         explorer.anew([replace(s, closure_f0={}) for s in explorer.systems])
         explorer.explore()
-    base = [
-        r.significance(around(explorer, s, (), i)) for i, (r, s) in enumerate(zip(recordings, recorded, strict=True))
-    ]
-    heldout = HeldOut(explorer, recorded, effort.folds, options)
-    judged = Judged.of(explorer, heldout, [r.usual_noise_f0() for r in recordings])
+    heldout = HeldOut(explorer, study.recorded, effort.folds, explorer.options)
+    judged = Judged.of(explorer, heldout, [r.usual_noise_f0() for r in study.recordings])
     _predict(judged)
     return Searched(
-        tuple(studies), tuple(fibres), tuple(recorded), tuple(recordings), explorer, judged, tuple(base), tuple(lines)
-    )
+        tuple(studies), study.fibres, study.recorded, study.recordings, explorer, judged, study.significance(),
+        study.lines,
+    )  # fmt: skip
 
 
 def _closed(explorer: Explorer, recorded: Sequence[System]) -> list[System]:

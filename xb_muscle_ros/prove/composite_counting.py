@@ -38,8 +38,8 @@ def scores(judged: Sequence[JudgedComposite]) -> list[Score]:
         share("fault_physics", "artefacts called physics", (j.physics for j in of["fault"]), 0.05, True),
         share("outside_silent", "outside effect not named", (_outside_silent(j) for j in of["outside"]), 0.85),
         calibration_score(
-            "calibration", "expected calibration error of inclusion probabilities, by family",
-            [by_family(j.statements) for j in judged],
+            "calibration", "expected calibration error of inclusion probabilities, as stated",
+            [as_stated(j.statements) for j in judged],
             0.05,
         ),
     ]  # fmt: skip
@@ -66,6 +66,10 @@ def scores(judged: Sequence[JudgedComposite]) -> list[Score]:
         share("null_artefact", "nulls with an artefact named", (bool(j.artefacts_named) for j in of["null"])),
         share("artefact_found", "artefacts beyond the ordinary: family named", _artefacts_found(of["fault"])),
         share("artefact_names_family", "artefacts of the right family among all named", _family_right(artefact_names)),
+        calibration_score(
+            "calibration_components", "expected calibration error, every component by its family",
+            [by_family(j.statements) for j in judged],
+        ),
         calibration_score(
             "calibration_families", "expected calibration error, one statement for each family of a case",
             [as_families(j.statements) for j in judged],
@@ -104,6 +108,15 @@ def _large(effects: Iterable[JudgedEffect]) -> list[JudgedEffect]:
 
 def _family_right(names: Iterable[JudgedName]) -> Iterator[bool]:
     return (name.family_right for name in names)
+
+
+def as_stated(statements: Iterable[JudgedName]) -> list[Stated]:
+    """Probabilities, each of what it says is there: a mechanism by name, a family of several by its family."""
+    return [
+        Stated(s.probability, s.exact_right if s.single else s.family_right)
+        for s in statements
+        if s.probability is not None
+    ]
 
 
 def by_family(statements: Iterable[JudgedName]) -> list[Stated]:

@@ -113,10 +113,12 @@ def needed(diagnosis: Mapping[str, Any]) -> dict[str, JsonValue]:
     }
 
 
-_OF_COMPONENT = ("name", "kind", "family", "members", "inclusion_probability")
+_OF_COMPONENT = ("name", "kind", "family", "members", "inclusion_probability", "log_odds", "contribution_f0")
 
 
 def _components(diagnosis: Mapping[str, Any]) -> dict[str, JsonValue]:
     """What the scoring needs of the components; nothing in format 1, which has none."""
     rows = diagnosis.get("components")
-    return {} if rows is None else {"components": [{key: row[key] for key in _OF_COMPONENT} for row in rows]}
+    return (
+        {} if rows is None else {"components": [{key: row[key] for key in _OF_COMPONENT if key in row} for row in rows]}
+    )

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xb_muscle_ros.diagnose.inference.calibration import OFFSET, PRACTICAL_F0, SIZE, SLOPE, calibrated
+from xb_muscle_ros.diagnose.inference.calibration import CONSTANTS, PRACTICAL_F0, calibrated
 
 SIZES = st.floats(0.0, 1.0)
 
@@ -37,4 +37,6 @@ def test_what_no_set_has_is_excluded_and_what_all_have_is_as_sure_as_can_be() ->
 @pytest.mark.parametrize("share", [0.3, 1.0])
 def test_between_the_ends_it_is_the_line_that_was_chosen(log_odds: float, share: float) -> None:
     p = calibrated(log_odds, share * PRACTICAL_F0)
-    assert math.log(p / (1.0 - p)) == pytest.approx(OFFSET + SLOPE * log_odds + SIZE * math.log(share))
+    assert math.log(p / (1.0 - p)) == pytest.approx(
+        CONSTANTS.offset + CONSTANTS.slope * log_odds + CONSTANTS.size * math.log(share)
+    )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xb_muscle_ros.diagnose.inference.averaging import Averaged, averaged, grouped
-from xb_muscle_ros.diagnose.inference.calibration import PRACTICAL_F0, calibrated
+from xb_muscle_ros.diagnose.inference.calibration import MOST_LOG_ODDS, PRACTICAL_F0, calibrated
 from xb_muscle_ros.diagnose.inference.heldout import HeldOut
 from xb_muscle_ros.diagnose.inference.population import distribution
 from xb_muscle_ros.diagnose.inference.shares import unique
@@ -120,6 +120,8 @@ def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Compon
         parameters=() if best is None else _of_all(judged, best, lead),
         not_separable_from=tuple(n.value for n in rivals),
         by_fibre=by_fibre,
+        log_odds=min(max(judged.averages.log_odds(group), -MOST_LOG_ODDS), MOST_LOG_ODDS),
+        contribution_f0=judged.averages.contribution_f0(group),
     )
 
 

@@ -1,33 +1,46 @@
 """From evidence to probability: log-odds of averaging over sets, scaled by what they are worth.
 
 Sets are compared by a likelihood that knows neither how wrong the forms of mechanisms are nor how many independent
-residuals a trial has. So its log-odds are scaled. The constants were chosen by hand on some thirty open
-composites, whose simulator shares no model with this one; sealed ones have not been scored with them (docs/prove.md).
+residuals a trial has. So its log-odds are scaled, by constants from open composites, whose simulator shares no model
+with this one (`scripts/fit_calibration.py`; docs/prove.md has what sealed ones made of them).
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-# Log-odds = OFFSET + SLOPE (log-odds of averaging) + SIZE log(contribution / PRACTICAL_F0).
-OFFSET, SLOPE, SIZE = 0.0, 0.6, 1.5
+
+class Constants(NamedTuple):
+    """Log-odds = offset + slope (log-odds of averaging) + size log(contribution / PRACTICAL_F0)."""
+
+    offset: float
+    slope: float
+    size: float
+
+
+CONSTANTS = Constants(-0.9, 0.36, 1.5)
 PRACTICAL_F0 = 0.003
 """A contribution below it is of no use to anyone, F0."""
 # Contributions are counted within these factors of it: a large one is no evidence of its own.
 _LEAST, _LARGEST = 0.1, 1.0
+MOST_LOG_ODDS = 50.0
+"""Log-odds of averaging count up to this."""
 # Beyond this nothing was ever seen to be surer.
 _MOST = 7.0
 
 
-def calibrated(log_odds: float, contribution_f0: float) -> float:
+def calibrated(log_odds: float, contribution_f0: float, constants: Constants = CONSTANTS) -> float:
     """Probability that something is part of the truth.
 
     Args:
         log_odds: by averaging over sets.
         contribution_f0: root of what it takes off the mean square of the best set without it, F0.
+        constants: of the calibration.
     """
     if math.isinf(log_odds) and log_odds < 0.0:
         return 0.0
     size = min(max(contribution_f0 / PRACTICAL_F0, _LEAST), _LARGEST)
-    worth = OFFSET + SLOPE * min(max(log_odds, -50.0), 50.0) + SIZE * math.log(size)
+    told = min(max(log_odds, -MOST_LOG_ODDS), MOST_LOG_ODDS)
+    worth = constants.offset + constants.slope * told + constants.size * math.log(size)
     return 1.0 / (1.0 + math.exp(-min(max(worth, -_MOST), _MOST)))

@@ -219,14 +219,16 @@ class Explorer:
         # An odd name more costs its odds; what promises less than that is not fitted.
         chosen = [n for n in told if gains[n] > 1.0][:count]
         chosen += [n for n in gains if np.isnan(gains[n]) and blind]
-        wanted = []
-        for n in chosen:
-            starts = [[*p.starts] for p in promises[n]]
-            if np.isnan(gains[n]):
-                own = starts_of(self.systems, n)
-                starts = [[*s, *o] for s, o in zip(starts, own, strict=True)]
-            wanted.append(((*names, n), starts))
+        wanted = [((*names, n), self.starts(promises[n])) for n in chosen]
         return self.fit(wanted, f"{label(names)} and one more")
+
+    def starts(self, promised: Sequence[Promise]) -> list[list[Mapping[str, float]]]:
+        """Where the fit of a candidate starts in every fibre."""
+        found: list[list[Mapping[str, float]]] = [[*p.starts] for p in promised]
+        if np.isnan(promised[0].gain):
+            own = starts_of(self.systems, promised[0].name)
+            return [[*s, *o] for s, o in zip(found, own, strict=True)]
+        return found
 
     def base(self) -> None:
         """Fit the base, from several starts.
