@@ -19,7 +19,7 @@ class Constants(NamedTuple):
     size: float
 
 
-CONSTANTS = Constants(-0.9, 0.36, 1.5)
+CONSTANTS = Constants(-1.2, 0.26, 1.6)
 PRACTICAL_F0 = 0.003
 """A contribution below it is of no use to anyone, F0."""
 # Contributions are counted within these factors of it: a large one is no evidence of its own.
