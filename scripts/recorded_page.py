@@ -13,8 +13,9 @@ from recorded_cases import Case
 from recorded_predictions import END_S
 from recorded_tables import components, concealed, feature_scores, fibres, force, places, probability, sets, table
 
+from xb_muscle_ros.diagnose.component import Kind
 from xb_muscle_ros.diagnose.report import output, prose
-from xb_muscle_ros.diagnose.result import Diagnosis, Kind
+from xb_muscle_ros.diagnose.result import Diagnosis
 
 INTRO = """# Real recordings
 

@@ -6,8 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from xb_muscle_ros.diagnose.component import NAMED
 from xb_muscle_ros.diagnose.report import phrases as say
-from xb_muscle_ros.diagnose.result import NAMED, Diagnosis, Place
+from xb_muscle_ros.diagnose.result import Diagnosis, Place
 
 _PLACES, _SETS, _COMPONENTS = 6, 8, 8
 # Components less probable than this are counted only.

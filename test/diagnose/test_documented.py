@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from xb_muscle_ros.diagnose import result
+from xb_muscle_ros.diagnose import component, result
 from xb_muscle_ros.diagnose.names import MECHANISMS
 
-_RECORDS = [kind for kind in vars(result).values() if isinstance(kind, type) and dataclasses.is_dataclass(kind)]
+_KINDS = {**vars(component), **vars(result)}.values()
+_RECORDS = [kind for kind in _KINDS if isinstance(kind, type) and dataclasses.is_dataclass(kind)]
 
 
 @pytest.fixture(scope="module")

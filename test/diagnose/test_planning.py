@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from made_trials import truth
 
+from xb_muscle_ros.diagnose.component import Component, Kind
 from xb_muscle_ros.diagnose.names import FAMILY, Name
 from xb_muscle_ros.diagnose.next_experiment import menu, propose, scaled
 from xb_muscle_ros.diagnose.planning import _pairs
-from xb_muscle_ros.diagnose.result import Component, Kind
 from xb_muscle_ros.models.fibre_file import changed
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.replay.offline import simulate_trial

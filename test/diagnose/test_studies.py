@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from made_trials import FIBRE, PCAS, given_fibre, study_of, trials_of, truth
 
+from xb_muscle_ros.diagnose.component import NAMED, Component, Kind
 from xb_muscle_ros.diagnose.effort import QUICK
 from xb_muscle_ros.diagnose.outputs import Files
-from xb_muscle_ros.diagnose.result import NAMED, Component, Diagnosis, Kind, Verdict
+from xb_muscle_ros.diagnose.result import Diagnosis, Verdict
 from xb_muscle_ros.diagnose.run import diagnose
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle

@@ -13,8 +13,9 @@ import pytest
 from sample_diagnoses import nothing
 
 from xb_muscle_ros.cli.main import main
+from xb_muscle_ros.diagnose.component import Component, Kind
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
-from xb_muscle_ros.diagnose.result import Component, Diagnosis, Kind, Place, Verdict
+from xb_muscle_ros.diagnose.result import Diagnosis, Place, Verdict
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.prove.counting import interval, scores
 from xb_muscle_ros.prove.judging import judge

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose import notes, outside
+from xb_muscle_ros.diagnose.component import Component
 from xb_muscle_ros.diagnose.effort import Effort
 from xb_muscle_ros.diagnose.inference.answer import answer_of, components, verdict_of
 from xb_muscle_ros.diagnose.inference.shares import explained
@@ -19,16 +20,7 @@ from xb_muscle_ros.diagnose.noise.residuals import Around
 from xb_muscle_ros.diagnose.noise.significance import ALPHA, FLOOR_F0
 from xb_muscle_ros.diagnose.outputs import NEXT, Files, augmented_name
 from xb_muscle_ros.diagnose.planning import plan
-from xb_muscle_ros.diagnose.result import (
-    FORMAT,
-    Component,
-    Diagnosis,
-    Law,
-    NextExperiment,
-    Remaining,
-    SetOfMechanisms,
-    Verdict,
-)
+from xb_muscle_ros.diagnose.result import FORMAT, Diagnosis, Law, NextExperiment, Remaining, SetOfMechanisms, Verdict
 from xb_muscle_ros.diagnose.rows import benchmark, law_row, nuisances, of_fibres, of_trials, places, scores
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.search.whole import beside, only

@@ -7,21 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from xb_muscle_ros.diagnose.component import NAMED, Component, Kind
 from xb_muscle_ros.diagnose.inference.left_out import left_out
 from xb_muscle_ros.diagnose.noise.kernel import Law as FoundLaw
 from xb_muscle_ros.diagnose.noise.residuals import Around
 from xb_muscle_ros.diagnose.noise.significance import ALPHA, Significance
-from xb_muscle_ros.diagnose.result import (
-    NAMED,
-    Component,
-    Kind,
-    Law,
-    Nuisance,
-    OfStudyFibre,
-    OfTrial,
-    Place,
-    Scores,
-)
+from xb_muscle_ros.diagnose.result import Law, Nuisance, OfStudyFibre, OfTrial, Place, Scores
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.searching import Searched
 from xb_muscle_ros.diagnose.tracing import Traced

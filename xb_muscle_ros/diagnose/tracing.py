@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from xb_muscle_ros.diagnose.component import Component
 from xb_muscle_ros.diagnose.inference.direction import direction
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.noise.cells import Residual
 from xb_muscle_ros.diagnose.noise.residuals import Around
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
-from xb_muscle_ros.diagnose.result import Component
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.search.whole import FRAMES, absent
 from xb_muscle_ros.diagnose.searching import Searched

@@ -9,10 +9,11 @@ import pytest
 from by_hand import DRAG, NOISE_F0, SHIFT, STIFFNESS, TITIN, with_odds
 from made_trials import given_fibre
 
+from xb_muscle_ros.diagnose.component import Component, HeldOutGain, Kind
 from xb_muscle_ros.diagnose.inference.answer import Judged, answer_of, verdict_of
 from xb_muscle_ros.diagnose.inference.heldout import HeldOut
 from xb_muscle_ros.diagnose.names import FAMILY, Name
-from xb_muscle_ros.diagnose.result import Component, HeldOutGain, Kind, Verdict
+from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.diagnose.search.system import System
 from xb_muscle_ros.work import Options
 

@@ -7,23 +7,18 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from xb_muscle_ros.diagnose.component import NAMED, Component, HeldOutGain, Kind, OfFibre, Parameter
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, MECHANISMS
 from xb_muscle_ros.diagnose.result import (
     FORMAT,
-    NAMED,
-    Component,
     Diagnosis,
     Feature,
     FeatureScore,
-    HeldOutGain,
-    Kind,
     Law,
     NextExperiment,
     Nuisance,
-    OfFibre,
     OfStudyFibre,
     OfTrial,
-    Parameter,
     Place,
     Remaining,
     Scores,

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.signal import lfilter
 
+from xb_muscle_ros.diagnose.component import Kind, Parameter
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
-from xb_muscle_ros.diagnose.result import Kind, Parameter
 
 Array = Any
 PCAS = (6.6, 6.4, 6.2, 6.1, 6.0, 5.8, 4.5)

@@ -9,7 +9,8 @@ import numpy as np
 from made_recordings import PHASES
 from sample_diagnoses import Sample, one_fibre
 
-from xb_muscle_ros.diagnose.result import OfFibre, OfTrial
+from xb_muscle_ros.diagnose.component import OfFibre
+from xb_muscle_ros.diagnose.result import OfTrial
 
 
 def many(fibres: int, trials: int, phases: int, parts: int, long: bool = False) -> Sample:

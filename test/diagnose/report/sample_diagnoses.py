@@ -20,18 +20,15 @@ from made_recordings import (
     rms,
 )
 
+from xb_muscle_ros.diagnose.component import Component, HeldOutGain, Kind, OfFibre
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import (
     FORMAT,
-    Component,
     Diagnosis,
     Feature,
-    HeldOutGain,
-    Kind,
     Law,
     NextExperiment,
     Nuisance,
-    OfFibre,
     OfStudyFibre,
     OfTrial,
     Place,

@@ -13,8 +13,9 @@ from generated_diagnoses import diagnoses
 from hypothesis import given, settings
 from sample_diagnoses import ALL, one_fibre
 
+from xb_muscle_ros.diagnose.component import Component
 from xb_muscle_ros.diagnose.report.codec import from_json, to_json
-from xb_muscle_ros.diagnose.result import Component, Diagnosis, Verdict
+from xb_muscle_ros.diagnose.result import Diagnosis, Verdict
 from xb_muscle_ros.errors import UserError
 
 

@@ -12,9 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sample_diagnoses import ALL, ambiguous, five_fibres, measurement, nothing, one_fibre, unexplained
 
+from xb_muscle_ros.diagnose.component import NAMED, SURE, Kind
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.prose import MOST, headline, summary
-from xb_muscle_ros.diagnose.result import NAMED, SURE, Diagnosis, Kind, Verdict
+from xb_muscle_ros.diagnose.result import Diagnosis, Verdict
 
 LACKS = "part of what the base model lacks"
 SURE_WORDS = {"almost certainly": (0.99, 1.0), "very likely": (0.9, 0.99), "probably": (0.66, 0.9),

@@ -9,10 +9,11 @@ from generated_diagnoses import diagnoses
 from hypothesis import given, settings
 from sample_diagnoses import ALL, five_fibres, one_fibre
 
+from xb_muscle_ros.diagnose.component import NAMED
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.prose import headline, summary
 from xb_muscle_ros.diagnose.report.terminal import terminal_text
-from xb_muscle_ros.diagnose.result import NAMED, Diagnosis
+from xb_muscle_ros.diagnose.result import Diagnosis
 
 
 def table(text: str) -> list[str]:

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from xb_muscle_ros.diagnose.component import NAMED, SURE, Component, Kind, OfFibre, Parameter
 from xb_muscle_ros.diagnose.inference.averaging import Averaged, averaged, grouped
 from xb_muscle_ros.diagnose.inference.calibration import MOST_LOG_ODDS, PRACTICAL_F0, calibrated
 from xb_muscle_ros.diagnose.inference.heldout import HeldOut
 from xb_muscle_ros.diagnose.inference.population import distribution
 from xb_muscle_ros.diagnose.inference.shares import unique
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
-from xb_muscle_ros.diagnose.result import NAMED, SURE, Component, Kind, OfFibre, Parameter, Verdict
+from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import Names, ordered
 from xb_muscle_ros.fit.coordinates import Coordinate

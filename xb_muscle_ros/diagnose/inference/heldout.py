@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from xb_muscle_ros.diagnose.component import HeldOutGain
 from xb_muscle_ros.diagnose.names import Name
-from xb_muscle_ros.diagnose.result import HeldOutGain
 from xb_muscle_ros.diagnose.search.descent import Fit
 from xb_muscle_ros.diagnose.search.explore import Explorer, fitted
 from xb_muscle_ros.diagnose.search.system import SATURATING, Names, System

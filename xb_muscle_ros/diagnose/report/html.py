@@ -12,12 +12,13 @@ from typing import Any, NamedTuple
 import jinja2
 from jinja2.filters import do_forceescape, do_mark_safe
 
+from xb_muscle_ros.diagnose.component import NAMED
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.figures.common import Figure, trial_labels
 from xb_muscle_ros.diagnose.report.glossary import GLOSSARY
 from xb_muscle_ros.diagnose.report.prose import headline, summary
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
-from xb_muscle_ros.diagnose.result import NAMED, Diagnosis, Nuisance
+from xb_muscle_ros.diagnose.result import Diagnosis, Nuisance
 from xb_muscle_ros.diagnose.words import digits, family_words, human, joined, meaning, phase_words
 
 _HERE = "xb_muscle_ros.diagnose.report"

@@ -5,16 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from xb_muscle_ros.diagnose.result import (
-    NAMED,
-    Component,
-    Diagnosis,
-    HeldOutGain,
-    Kind,
-    Nuisance,
-    Parameter,
-    Place,
-)
+from xb_muscle_ros.diagnose.component import NAMED, Component, HeldOutGain, Kind, Parameter
+from xb_muscle_ros.diagnose.result import Diagnosis, Nuisance, Place
 from xb_muscle_ros.diagnose.words import digits, family_words, human, joined, phase_words, quantity
 
 NOTHING = "–"

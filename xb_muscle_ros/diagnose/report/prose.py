@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 
+from xb_muscle_ros.diagnose.component import NAMED, SURE, Component
 from xb_muscle_ros.diagnose.report import phrases as say
-from xb_muscle_ros.diagnose.result import NAMED, SURE, Component, Diagnosis, Law, Verdict
+from xb_muscle_ros.diagnose.result import Diagnosis, Law, Verdict
 from xb_muscle_ros.diagnose.words import SCALES, chance, human, joined, quantity
 
 MOST = 6

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import textwrap
 
+from xb_muscle_ros.diagnose.component import NAMED, Component, Kind
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.prose import headline, summary
-from xb_muscle_ros.diagnose.result import NAMED, Component, Diagnosis, Kind
+from xb_muscle_ros.diagnose.result import Diagnosis
 
 _HEAD = ("component", "probability", "share", "held-out gain ± se", "parameter [95 %]", "does")
 _RIGHT = (1, 2)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.diagnose.component import NAMED, Component
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.figures.common import (
     DOTS,
@@ -19,7 +20,7 @@ from xb_muscle_ros.diagnose.report.figures.common import (
     unique,
     wrapped,
 )
-from xb_muscle_ros.diagnose.result import NAMED, Component, Diagnosis, OfStudyFibre
+from xb_muscle_ros.diagnose.result import Diagnosis, OfStudyFibre
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
 _FIBRES, _COMPONENTS = 12, 10

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.diagnose.component import Component, Kind
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.figures.common import (
     DATA_LINE,
@@ -23,7 +24,7 @@ from xb_muscle_ros.diagnose.report.figures.common import (
     wrapped,
 )
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
-from xb_muscle_ros.diagnose.result import Component, Diagnosis, Kind, OfTrial
+from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
 from xb_muscle_ros.figures.style import MODEL, SECOND, figure
 
 _TRIALS, _PARTS = 3, 6

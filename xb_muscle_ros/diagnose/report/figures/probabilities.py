@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.diagnose.component import NAMED, SURE, Component, HeldOutGain, Kind
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.figures.common import WIDTH_MM, Figure, finite, quiet_rows, shown_of, svg, wrapped
-from xb_muscle_ros.diagnose.result import NAMED, SURE, Component, Diagnosis, HeldOutGain, Kind
+from xb_muscle_ros.diagnose.result import Diagnosis
 from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
 
 _MOST, _ROW_MM = 14, 6.4
