@@ -144,7 +144,7 @@ def _reliability(path: Path, bins: Sequence[dict[str, Any]], score: Score) -> Pa
             linestyle="none", label="found (95 % interval)",
         )  # fmt: skip
         axes.set_ylim(-0.03, 1.03)
-        axes.set_ylabel("Share with an effect of the family")
+        axes.set_ylabel("Share that is there")
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, borderpad=0.0)
         axes.text(
             0.98, 0.04,

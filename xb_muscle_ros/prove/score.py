@@ -92,12 +92,12 @@ def _of_singles(truths: Sequence[Mapping[str, Any]], found: Mapping[str, Any]) -
 
 def _of_composites(truths: Sequence[Mapping[str, Any]], found: Mapping[str, Any]) -> Summary:
     from xb_muscle_ros.prove.calibration import reliability
-    from xb_muscle_ros.prove.composite_counting import by_family, by_size, scores
+    from xb_muscle_ros.prove.composite_counting import as_stated, by_size, scores
     from xb_muscle_ros.prove.composite_figures import draw
     from xb_muscle_ros.prove.composite_judging import judge_composite
 
     judged = [judge_composite(truth, found[truth["case"]]) for truth in truths]
-    sizes, bins, counted = by_size(judged), reliability([by_family(j.statements) for j in judged]), scores(judged)
+    sizes, bins, counted = by_size(judged), reliability([as_stated(j.statements) for j in judged]), scores(judged)
     tree = {"by_size": sizes, "calibration": bins, "judged": [j.as_json() for j in judged]}
     section = _sizes("Effects", sizes, "from_f0", ("family in the answer", "name in the answer"), ("family", "exact"))
     error = next(s for s in counted if s.name == "calibration")
@@ -140,7 +140,14 @@ def table(found: Sequence[Score]) -> str:
 
 
 # Scores that are no share of cases, with their decimals.
-_DECIMALS = {"gain": 2, "calibration": 3, "calibration_families": 3, "calibration_exact": 3, "calibration_artefacts": 3}
+_DECIMALS = {
+    "gain": 2,
+    "calibration": 3,
+    "calibration_families": 3,
+    "calibration_components": 3,
+    "calibration_exact": 3,
+    "calibration_artefacts": 3,
+}
 
 
 def _number(s: Score, value: float | None) -> str:
