@@ -9,7 +9,13 @@ import numpy as np
 
 from xb_muscle_ros.diagnose.component import NAMED, SURE, Component, Kind, OfFibre, Parameter
 from xb_muscle_ros.diagnose.inference.averaging import Averaged, averaged, grouped
-from xb_muscle_ros.diagnose.inference.calibration import MOST_LOG_ODDS, PRACTICAL_F0, calibrated
+from xb_muscle_ros.diagnose.inference.calibration import (
+    ARTEFACTS,
+    CONSTANTS,
+    MOST_LOG_ODDS,
+    PRACTICAL_F0,
+    calibrated,
+)
 from xb_muscle_ros.diagnose.inference.heldout import HeldOut
 from xb_muscle_ros.diagnose.inference.population import distribution
 from xb_muscle_ros.diagnose.inference.shares import unique
@@ -64,7 +70,8 @@ class Judged:
         # The base takes up ordinary errors, however large: what naming one gains is no residual, but its improbability.
         ordinary = all(n.value in ORDINARY for n in group)
         size_f0 = PRACTICAL_F0 if ordinary else averages.contribution_f0(group)
-        return calibrated(averages.log_odds(group), size_f0)
+        constants = ARTEFACTS if group[0] in MEASUREMENT else CONSTANTS
+        return calibrated(averages.log_odds(group), size_f0, constants)
 
     @property
     def chosen(self) -> Names:

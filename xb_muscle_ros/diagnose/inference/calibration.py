@@ -20,6 +20,9 @@ class Constants(NamedTuple):
 
 
 CONSTANTS = Constants(-1.2, 0.26, 1.6)
+"""Of mechanisms."""
+ARTEFACTS = Constants(0.0, 0.6, 1.5)
+"""Of artefacts, whose forms are known; chosen by hand."""
 PRACTICAL_F0 = 0.003
 """A contribution below it is of no use to anyone, F0."""
 # Contributions are counted within these factors of it: a large one is no evidence of its own.
