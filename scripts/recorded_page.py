@@ -22,8 +22,9 @@ INTRO = """# Real recordings
 Made by `scripts/diagnose_recordings.py`: trials are imported, some of them are diagnosed, and the others, concealed
 until then, are predicted by two fibre files: the fitted base, and the answer's augmented fibre. Of a concealed trial
 nothing is used but its own force before anything moves, and that only for its solution's pCa shift and its force
-offset; errors of a whole set (time shift, length gain) go on to trials that were recorded with the shown ones. RMSD is the root mean square of simulated less measured force, in % F0. "Held out" is that of conditions which
-the diagnosis itself left out of its fits (whole solutions where each has two trials or more).
+offset; errors of a whole set (time shift, length gain) go on to trials that were recorded with the shown ones. RMSD
+is the root mean square of simulated less measured force, in % F0. "Held out" is that of conditions which the
+diagnosis itself left out of its fits (whole solutions where each has two trials or more).
 """
 FORMER = "*This section was made by the former version of the diagnosis (format 1), and has not been run again.*"
 _MARK = "<!-- diagnosis.json, format {} -->"
