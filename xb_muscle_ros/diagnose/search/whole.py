@@ -22,13 +22,17 @@ from xb_muscle_ros.models.registry import compose, model_of_set, row_of, with_me
 
 FRAMES = (Name.THIN_FILAMENT_COOPERATIVITY, Name.SERIES_COMPLIANCE, Name.HALF_SARCOMERE_SPREAD)
 """Mechanisms that are another model rather than a value."""
+# Shapes at which what is absent costs no steps either: friction whose links never slip.
+_IDLE: Mapping[Name, Mapping[str, float]] = {Name.FILAMENT_FRICTION: {"friction_way": 1.0}}
 _SWITCHED: Mapping[Name, Mapping[str, float]] = {Name.THICK_FILAMENT_COOPERATIVITY: {"J2": 0.0}}
 
 
 def absent(name: Name) -> dict[str, float]:
     """Values of parameters at which a mechanism of a frame does exactly nothing."""
     effect = CATALOGUE[name.value].effect
-    return dict(_SWITCHED[name]) if name in _SWITCHED else {} if effect is None else {effect: 0.0}
+    return (
+        dict(_SWITCHED[name]) if name in _SWITCHED else {} if effect is None else {effect: 0.0, **_IDLE.get(name, {})}
+    )
 
 
 def beside(fibre: Fibre) -> tuple[Name, ...]:
