@@ -125,6 +125,9 @@ def test_what_is_absent_is_the_null_of_the_catalogue() -> None:
             assert absent(name) == {}
         elif name is Name.THICK_FILAMENT_COOPERATIVITY:
             assert absent(name) == {"J2": 0.0}
+        elif name is Name.FILAMENT_FRICTION:
+            # Links that never slip: absent friction has no steps halved.
+            assert absent(name) == {"friction_force": 0.0, "friction_way": 1.0}
         else:
             assert absent(name) == {entry.effect: 0.0}
 
