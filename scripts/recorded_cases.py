@@ -201,6 +201,7 @@ _CASES = (
         },
         _whole_muscle(0.95),
         prepare=stimulated,
+        error_sds={"time_shift": 0.01},
     ),
     Case(
         "trabecula_relaxed", "Mouse trabecula, relaxed", _RELAXED, _MOUSE,

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from xb_muscle_ros.diagnose.component import NAMED
+from xb_muscle_ros.diagnose.component import NAMED, OfFibre
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.result import Diagnosis, Place
 
@@ -52,7 +52,7 @@ def components(d: Diagnosis) -> str:
 def fibres(d: Diagnosis) -> str:
     """Each fibre of a study: what it says alone, and how the common answer does in it."""
     names = d.named
-    heads = ["fibre", "named by it alone", *(f"{c.members[0]}, by it alone" for c in names)]
+    heads = ["fibre", "named by it alone", *(f"{c.members[0]}: by it alone; log Bayes factor" for c in names)]
     heads += ["RMSD", "held out", "fibre left out"]
     cells = []
     for i, row in enumerate(d.by_fibre):
@@ -61,13 +61,18 @@ def fibres(d: Diagnosis) -> str:
             [
                 row.fibre,
                 ", ".join(row.answer) or say.NOTHING,
-                *(probability(c.by_fibre[i].inclusion_probability) for c in names),
+                *(_of_fibre(c.by_fibre[i]) for c in names),
                 f"{force(row.before.train_rmsd_f0)} → {force(row.after.train_rmsd_f0)}",
                 f"{force(row.before.heldout_rmsd_f0)} → {force(row.after.heldout_rmsd_f0)}",
                 say.NOTHING if left is None else f"{force(left[0])} → {force(left[1])}",
             ]
         )
     return table(heads, cells)
+
+
+def _of_fibre(row: OfFibre) -> str:
+    told = say.NOTHING if row.replication is None else f"{row.replication:+.1f}".replace("-", "−")
+    return f"{probability(row.inclusion_probability)}; {told}"
 
 
 def places(found: Sequence[Place]) -> str:

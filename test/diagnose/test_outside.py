@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from made_trials import PROTOCOL, fitted_trials, given_fibre, truth
 
-from xb_muscle_ros.diagnose.outside import _judged, warnings
+from xb_muscle_ros.diagnose.outside import _judged, warnings, worse_left_out
+from xb_muscle_ros.diagnose.result import OfTrial
 from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.models.fibre_file import Fibre, changed
 
@@ -63,3 +64,22 @@ def test_no_solution_where_the_base_has_one() -> None:
     assert _judged("a", "there", [None, None], 0.5) == []
     assert _judged("a", "there", [force, None], 0.5) == []
     assert len(_judged("a", "there", [10.0 * force, None], 0.5)) == 1
+
+
+def left_out(fibre: str, trial: str, before_f0: float | None, after_f0: float | None) -> OfTrial:
+    return OfTrial(fibre, trial, 6.2, (), 1e-3, "window", 100, 0.01, 0.005, before_f0, after_f0)
+
+
+def test_left_out_trials_that_the_answer_predicts_worse_are_told() -> None:
+    rows = [
+        left_out("a", "ramp", 0.03, 0.039),
+        left_out("a", "cycle", 0.03, 0.0475),
+        left_out("a", "release", 0.03, float("inf")),
+        left_out("a", "shown", None, None),
+        left_out("b", "ramp", 0.03, 0.01),
+    ]
+    assert worse_left_out(rows) == [
+        "fibre a: the answer predicts trials cycle (4.8 for 3.0 % F0) and release (no solution) worse than the base does "
+        "where they are left out of the fit; do not rely on it in movements like that"
+    ]
+    assert worse_left_out(rows[:1]) == []

@@ -10,6 +10,9 @@ from dataclasses import dataclass
 
 NAMED, SURE = 0.5, 0.9
 """Inclusion probability from which a mechanism is in the answer, and from which physics may be the verdict."""
+REPLICATED = 1.0
+"""Log Bayes factor of a fibre, given the others, from which it replicates a component: positive evidence (2.7 to 1)
+on the scale of Kass and Raftery 1995."""
 
 
 class Kind(str, enum.Enum):
@@ -76,6 +79,8 @@ class OfFibre:
         share_of_mismatch: of this fibre's.
         heldout_gain: None where nothing could be left out.
         parameters: estimates in this fibre.
+        replication: log Bayes factor for the component by this fibre's recordings, given those of all other fibres;
+            within ±50; None for a study of one fibre.
     """
 
     fibre: str
@@ -83,6 +88,12 @@ class OfFibre:
     share_of_mismatch: float
     heldout_gain: HeldOutGain | None
     parameters: tuple[Parameter, ...]
+    replication: float | None = None
+
+    @property
+    def replicates(self) -> bool:
+        """Whether this fibre says again what the others say."""
+        return self.replication is not None and self.replication >= REPLICATED
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.words import percent
+from xb_muscle_ros.diagnose.result import OfTrial
+from xb_muscle_ros.diagnose.words import joined, percent
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.models.fibre_file import Fibre
@@ -20,6 +22,8 @@ _PASSIVE_F0, _ACTIVE_F0, _PUSH_F0 = 0.5, 3.0, -0.05
 # Less than this beyond the base's is not the answer's doing, F0.
 _MORE_F0 = 0.1
 _PASSIVE_PCA = 9.0
+# A left-out trial that the answer predicts worse by more than this says that it does not hold everywhere, F0.
+_WORSE_F0 = 0.01
 
 
 def warnings(fibre: Fibre, base: Fibre, trials: Sequence[FitTrial]) -> list[str]:
@@ -42,6 +46,21 @@ def warnings(fibre: Fibre, base: Fibre, trials: Sequence[FitTrial]) -> list[str]
     forces = [_force(f, fastest, fastest.length_l0, calcium, 0.5) for f in (fibre, base)]
     found += _judged(fibre.name, f"trial {fastest.name} at twice its speed and the highest calcium", forces, _ACTIVE_F0)
     return found
+
+
+def worse_left_out(rows: Sequence[OfTrial]) -> list[str]:
+    """A line for each fibre with trials that the answer, fitted without them, predicts worse than the base does."""
+    found: dict[str, list[str]] = {}
+    for row in rows:
+        before, after = row.heldout_before_f0, row.heldout_after_f0
+        if before is not None and after is not None and after > before + _WORSE_F0:
+            told = f"{percent(after)} for {percent(before)} % F0" if math.isfinite(after) else "no solution"
+            found.setdefault(row.fibre, []).append(f"{row.trial} ({told})")
+    return [
+        f"fibre {fibre}: the answer predicts {'trial' if len(told) == 1 else 'trials'} {joined(told, 'and')} worse than "
+        "the base does where they are left out of the fit; do not rely on it in movements like that"
+        for fibre, told in found.items()
+    ]
 
 
 def _force(fibre: Fibre, trial: FitTrial, length: Array, calcium: Array, slower: float) -> Array | None:

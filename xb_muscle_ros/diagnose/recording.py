@@ -76,6 +76,9 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
             base = study.fibre_with((), i)
             with_all = study.fibre_with(chosen, i)
             warned += outside.warnings(with_all, base, study.recorded[i].trials)
+    trials = of_trials(study, chosen, traces)
+    if augmented:
+        warned += outside.worse_left_out(trials)
     d = Diagnosis(
         format_version=FORMAT,
         fibres=tuple(names),
@@ -99,7 +102,7 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
         benchmark_rmsd_f0=benchmark(study, before),
         sets=_sets(study),
         by_fibre=of_fibres(study, chosen, found),
-        trials=of_trials(study, chosen, traces),
+        trials=trials,
         nuisances=nuisances(study, chosen),
         map_before={n: study.base[known[n]].map(ALPHA) for n in names},
         map_after={n: left[known[n]].map(ALPHA) for n in names},

@@ -6,10 +6,10 @@ import itertools
 
 import numpy as np
 import pytest
-from by_hand import DRAG, NOISE_F0, SHIFT, STIFFNESS, TITIN, with_odds
+from by_hand import DRAG, NOISE_F0, SHIFT, STIFFNESS, TITIN, explorer, fit, with_odds
 from made_trials import given_fibre
 
-from xb_muscle_ros.diagnose.component import Component, HeldOutGain, Kind
+from xb_muscle_ros.diagnose.component import Component, HeldOutGain, Kind, OfFibre
 from xb_muscle_ros.diagnose.inference.answer import Judged, answer_of, verdict_of
 from xb_muscle_ros.diagnose.inference.heldout import HeldOut
 from xb_muscle_ros.diagnose.names import FAMILY, Name
@@ -94,3 +94,21 @@ def test_names_of_evidence_that_no_set_has_together_are_chosen_together() -> Non
 
 def test_nothing_of_evidence_leaves_the_base() -> None:
     assert judged(((), 3.0), ((DRAG,), 0.0)).chosen == ()
+
+
+def test_a_fibre_replicates_what_it_adds_to_the_others() -> None:
+    rows = {(): [fit((), 0.0) for _ in range(3)], (DRAG,): [fit((DRAG,), gained) for gained in (6.0, -1.0, 0.9)]}
+    e = explorer(rows, 3)
+    judged = Judged.of(e, HeldOut(e, e.systems, 5, Options()), [NOISE_F0] * 3)
+    assert [judged.replication([DRAG], i) for i in range(3)] == pytest.approx([6.0, -1.0, 0.9])
+    rated = [OfFibre("a", 0.1, 0.0, None, (), judged.replication([DRAG], i)) for i in range(3)]
+    assert [row.replicates for row in rated] == [True, False, False]
+    # Nobody looked at a model without it, so nothing can be said.
+    only = explorer({(DRAG,): rows[DRAG,]}, 3)
+    assert Judged.of(only, HeldOut(only, only.systems, 5, Options()), [NOISE_F0] * 3).replication([DRAG], 0) is None
+
+
+def test_one_fibre_replicates_nothing() -> None:
+    e = with_odds(((), 0.0), ((DRAG,), 6.0))
+    judged = Judged.of(e, HeldOut(e, e.systems, 5, Options()), [NOISE_F0])
+    assert judged.replication([DRAG], 0) is None

@@ -36,7 +36,7 @@ def test_evidence_counts_odds_fit_priors_and_their_width() -> None:
 
 def test_of_several_fibres_the_evidence_adds_up_and_each_has_its_own() -> None:
     e = explorer({(): [fit((), 0.0), fit((), 0.0)], (DRAG,): [fit((DRAG,), 6.0), fit((DRAG,), -1.0)]}, 2)
-    both, first, second = averaged(e), averaged(e, 0), averaged(e, 1)
+    both, first, second = averaged(e), averaged(e, [0]), averaged(e, [1])
     assert both.log_odds([DRAG]) == pytest.approx(5.0 + math.log(0.1))
     assert first.log_odds([DRAG]) == pytest.approx(6.0 + math.log(0.1))
     assert second.log_odds([DRAG]) == pytest.approx(-1.0 + math.log(0.1))

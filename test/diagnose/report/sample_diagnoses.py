@@ -114,9 +114,9 @@ def components(
         for k, fibre in enumerate(fibres):
             own = [t for t in traces if t.fibre == fibre]
             alone = min(0.99, max(0.02, e.probability - 0.25 * abs(math.sin(2.0 * k + len(e.name)))))
-            rows.append(
-                OfFibre(fibre, alone, min(1.0, rms(adds) ** 2 / mismatch), gain_of(own, e.name), (e.parameter,))
-            )
+            again = 10.0 * (alone - 0.4) if len(fibres) > 1 else None
+            share = min(1.0, rms(adds) ** 2 / mismatch)
+            rows.append(OfFibre(fibre, alone, share, gain_of(own, e.name), (e.parameter,), again))
         share = min(1.0, 0.45 * rms(adds) ** 2 / mismatch)
         out.append(
             Component(

@@ -147,10 +147,10 @@ def test_several_fibres_say_how_many_agree_and_families_that_they_are_one() -> N
     d = five_fibres().diagnosis
     text = said(d)
     assert "the recordings of 5 fibres" in text
-    assert "viscous drag very likely (0.93; 5 of 5 fibres taken alone)" in text
+    assert "viscous drag very likely (0.93; replicated in 5 of 5 fibres)" in text
     assert (
         "active titin or static calcium-dependent stiffness, which these recordings cannot tell apart, probably "
-        "(0.71; 3 of 5 fibres taken alone)"
+        "(0.71; replicated in 3 of 5 fibres)"
     ) in text
 
 

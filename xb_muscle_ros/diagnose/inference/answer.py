@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -40,7 +41,9 @@ class Judged:
     Attributes:
         explorer: all fits.
         heldout: predictions of left-out conditions.
-        averages: over all fibres; of each fibre.
+        averages: over all fibres.
+        of_fibres: of each fibre.
+        without_fibres: of all fibres but each; empty where there is one.
         noise_f0: of each fibre's recordings.
     """
 
@@ -48,15 +51,19 @@ class Judged:
     heldout: HeldOut
     averages: Averaged
     of_fibres: tuple[Averaged, ...]
+    without_fibres: tuple[Averaged, ...]
     noise_f0: tuple[float, ...]
 
     @staticmethod
     def of(explorer: Explorer, heldout: HeldOut, noise_f0: Sequence[float]) -> Judged:
         """With averages over what was searched."""
-        single = len(explorer.systems) == 1
+        fibres = range(len(explorer.systems))
         whole = averaged(explorer)
-        each = (whole,) if single else tuple(averaged(explorer, i) for i in range(len(explorer.systems)))
-        return Judged(explorer, heldout, whole, each, tuple(noise_f0))
+        if len(fibres) == 1:
+            return Judged(explorer, heldout, whole, (whole,), (), tuple(noise_f0))
+        each = tuple(averaged(explorer, [i]) for i in fibres)
+        others = tuple(averaged(explorer, [k for k in fibres if k != i]) for i in fibres)
+        return Judged(explorer, heldout, whole, each, others, tuple(noise_f0))
 
     @property
     def groups(self) -> list[tuple[Name, ...]]:
@@ -72,6 +79,16 @@ class Judged:
         size_f0 = PRACTICAL_F0 if ordinary else averages.contribution_f0(group)
         constants = ARTEFACTS if group[0] in MEASUREMENT else CONSTANTS
         return calibrated(averages.log_odds(group), size_f0, constants)
+
+    def replication(self, group: Sequence[Name], fibre: int) -> float | None:
+        """Log Bayes factor: by how much a fibre raises the log-odds that the other fibres alone give a component.
+
+        None where there is no other fibre, or where no set is without the component.
+        """
+        if not self.without_fibres:
+            return None
+        told = self.averages.log_odds(group) - self.without_fibres[fibre].log_odds(group)
+        return min(max(told, -MOST_LOG_ODDS), MOST_LOG_ODDS) if math.isfinite(told) else None
 
     @property
     def chosen(self) -> Names:
@@ -114,6 +131,7 @@ def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Compon
             share_of_mismatch=unique(e, chosen, without, judged.noise_f0, i) if own is not None else 0.0,
             heldout_gain=judged.heldout.gain(chosen, without, i) if own is not None else None,
             parameters=() if best is None else _of_one(judged, best, lead, i),
+            replication=judged.replication(group, i),
         )
         for i, system in enumerate(e.systems)
     )

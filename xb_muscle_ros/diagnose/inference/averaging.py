@@ -88,13 +88,13 @@ class Averaged:
         return found
 
 
-def averaged(explorer: Explorer, fibre: int | None = None) -> Averaged:
-    """All sets that were looked at, by the evidence of all fibres or of one."""
+def averaged(explorer: Explorer, fibres: Sequence[int] | None = None) -> Averaged:
+    """All sets that were looked at, by the evidence of all fibres or of some."""
     sets, evidence, squares, fitted = [], [], [], []
-    chosen = range(len(explorer.systems)) if fibre is None else [fibre]
+    chosen = range(len(explorer.systems)) if fibres is None else fibres
     for names, fits in explorer.fits.items():
         sets.append(names)
-        evidence.append(explorer.evidence(names, fibre))
+        evidence.append(explorer.evidence(names, fibres))
         squares.append(float(np.mean([fits[i].mean_square_f0 for i in chosen])))
         fitted.append(True)
     for names, promised in explorer.promised.items():
@@ -112,7 +112,9 @@ def averaged(explorer: Explorer, fibre: int | None = None) -> Averaged:
             gained += 0.5 * told * math.log((floor**2 + before) / (floor**2 + min(promised[i], before)))
         # What a line promises and nobody fitted is no evidence beyond that of what was fitted.
         sets.append(names)
-        evidence.append(min(explorer.evidence(parent, fibre) + gained, explorer.evidence(explorer.best(), fibre) - 1.0))
+        evidence.append(
+            min(explorer.evidence(parent, fibres) + gained, explorer.evidence(explorer.best(), fibres) - 1.0)
+        )
         squares.append(float(np.mean([promised[i] for i in chosen])))
         fitted.append(False)
     found = np.array(evidence)

@@ -42,6 +42,11 @@ GLOSSARY: Mapping[str, Term] = MappingProxyType(
             "the sum of the probabilities of all sets of mechanisms that contain it. It says nothing of effects that "
             "no candidate describes.",
         ),
+        "replication": Term(
+            "Replication",
+            "A fibre replicates a component where its own recordings speak for what the other fibres show: with the "
+            "effect distributed as in the others, its log Bayes factor is 1 or more (2.7 to 1).",
+        ),
         "share_of_mismatch": Term(
             "Share of mismatch",
             "Ablation loss: what of the base model's mismatch comes back if this component alone is taken out of the "

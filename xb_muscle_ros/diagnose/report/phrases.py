@@ -125,9 +125,10 @@ def artefacts(components: Iterable[Component]) -> list[Component]:
     return [c for c in components if c.kind is Kind.ARTEFACT]
 
 
-def alone(c: Component) -> tuple[int, int]:
-    """In how many fibres a component has a probability of `NAMED` by that fibre alone, and of how many."""
-    return sum(row.inclusion_probability >= NAMED for row in c.by_fibre), len(c.by_fibre)
+def replicated(c: Component) -> tuple[int, int]:
+    """In how many fibres a component that the other fibres show is found again, and of how many."""
+    told = [row for row in c.by_fibre if row.replication is not None]
+    return sum(row.replicates for row in told), len(told)
 
 
 def changed(d: Diagnosis) -> bool:

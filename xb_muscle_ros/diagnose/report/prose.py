@@ -105,8 +105,8 @@ def _clause(d: Diagnosis, c: Component, what: str) -> str:
     name = say.title(c)
     if len(c.members) > 1:
         name += ", which these recordings cannot tell apart,"
-    agreed, of = say.alone(c)
-    fibres = f"; {agreed} of {of} fibres taken alone" if of > 1 else ""
+    again, of = say.replicated(c)
+    fibres = f"; replicated in {again} of {of} fibres" if of > 1 else ""
     value = f"({'probability ' if what else ''}{say.probability(c.inclusion_probability)}{fibres})"
     word = say.sureness(c.inclusion_probability)
     return f"{name} is {word} {what} {value}" if what else f"{name} {word} {value}"

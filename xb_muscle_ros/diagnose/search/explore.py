@@ -101,7 +101,8 @@ class Explorer:
         self.fits: dict[Names, tuple[Fit, ...]] = {}
         self.promised: dict[Names, tuple[float, ...]] = {}
         self.unsolved: list[Names] = []
-        self._adjusted: dict[tuple[Names, int | None], float] = {}
+        self._estimates: dict[Names, dict[str, list[Estimate]]] = {}
+        self._adjusted: dict[tuple[Names, tuple[int, ...]], float] = {}
         self._linear: dict[Names, list[Linear]] = {}
         self.floors_f0 = [s.noise_f0 for s in systems]
 
@@ -140,36 +141,38 @@ class Explorer:
             self._linear[names] = [Linear(s, f) for s, f in zip(self.systems, self.fits[names], strict=True)]
         return self._linear[names]
 
-    def evidence(self, names: Names, fibre: int | None = None) -> float:
-        """Logarithm of a set's probability but for a constant, by all fibres together or by one."""
-        chosen = range(len(self.systems)) if fibre is None else [fibre]
+    def evidence(self, names: Names, fibres: Sequence[int] | None = None) -> float:
+        """Logarithm of a set's probability but for a constant, by all fibres together or by some."""
+        chosen = range(len(self.systems)) if fibres is None else fibres
         fits = self.fits[names]
         own = [self._cost(self.systems[i], fits[i], self.floors_f0[i]) for i in chosen]
-        found = self.odds(names) + self.adjusted(names, fibre) - float(sum(own))
+        found = self.odds(names) + self.adjusted(names, chosen) - float(sum(own))
         return found if np.isfinite(found) else _NONE
 
     def estimates(self, names: Names) -> dict[str, list[Estimate]]:
         """Coordinates of the mechanisms of a set in every fibre, by label."""
-        fits = self.fits[names]
-        own = [n for n in names if n not in MEASUREMENT]
-        effects = {CATALOGUE[n.value].effect for n in own}
-        labels = dict.fromkeys(label for n in own for label in CATALOGUE[n.value].parameters)
-        found: dict[str, list[Estimate]] = {label: [] for label in labels}
-        for system, fit in zip(self.systems, fits, strict=True):
-            coordinates = {c.label: c for c in system.problem(names, fit.values).coordinates}
-            for key in labels:
-                c = coordinates[key]
-                value, sd = c.inward(fit.values[key]), fit.sds[key]
-                found[key].append(Estimate(value, sd, c.prior_mean, c.prior_sd, key in effects))
-        return found
+        if names not in self._estimates:
+            fits = self.fits[names]
+            own = [n for n in names if n not in MEASUREMENT]
+            effects = {CATALOGUE[n.value].effect for n in own}
+            labels = dict.fromkeys(label for n in own for label in CATALOGUE[n.value].parameters)
+            found: dict[str, list[Estimate]] = {label: [] for label in labels}
+            for system, fit in zip(self.systems, fits, strict=True):
+                coordinates = {c.label: c for c in system.problem(names, fit.values).coordinates}
+                for key in labels:
+                    c = coordinates[key]
+                    value, sd = c.inward(fit.values[key]), fit.sds[key]
+                    found[key].append(Estimate(value, sd, c.prior_mean, c.prior_sd, key in effects))
+            self._estimates[names] = found
+        return self._estimates[names]
 
-    def adjusted(self, names: Names, fibre: int | None = None) -> float:
+    def adjusted(self, names: Names, fibres: Sequence[int] | None = None) -> float:
         """What it adds to the evidence that effects are mostly small, and alike in all fibres."""
-        key = names, fibre
+        chosen = tuple(range(len(self.systems)) if fibres is None else fibres)
+        key = names, chosen
         if key not in self._adjusted:
-            found = self.estimates(names).values()
-            chosen = [e if fibre is None else [e[fibre]] for e in found]
-            self._adjusted[key] = sum(adjustment(e) for e in chosen)
+            rows = self.estimates(names).values()
+            self._adjusted[key] = sum(adjustment([row[i] for i in chosen]) for row in rows)
         return self._adjusted[key]
 
     @staticmethod
@@ -249,7 +252,7 @@ class Explorer:
         """Other systems; fits start where those of the former ones ended."""
         starts = [[f.values] for f in self.fits[()]]
         self.systems = list(systems)
-        for kept in (self.fits, self.promised, self.unsolved, self._adjusted, self._linear):
+        for kept in (self.fits, self.promised, self.unsolved, self._estimates, self._adjusted, self._linear):
             kept.clear()
         self.fit([((), starts)], "base once more")
         self.base()
