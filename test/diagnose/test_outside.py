@@ -79,7 +79,7 @@ def test_left_out_trials_that_the_answer_predicts_worse_are_told() -> None:
         left_out("b", "ramp", 0.03, 0.01),
     ]
     assert worse_left_out(rows) == [
-        "fibre a: the answer predicts trials cycle (4.8 for 3.0 % F0) and release (no solution) worse than the base does "
-        "where they are left out of the fit; do not rely on it in movements like that"
+        "fibre a: the answer predicts trials cycle (4.8 for 3.0 % F0) and release (no solution) worse than the base "
+        "does where they are left out of the fit; do not rely on it in movements like that"
     ]
     assert worse_left_out(rows[:1]) == []

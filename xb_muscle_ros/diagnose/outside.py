@@ -57,8 +57,8 @@ def worse_left_out(rows: Sequence[OfTrial]) -> list[str]:
             told = f"{percent(after)} for {percent(before)} % F0" if math.isfinite(after) else "no solution"
             found.setdefault(row.fibre, []).append(f"{row.trial} ({told})")
     return [
-        f"fibre {fibre}: the answer predicts {'trial' if len(told) == 1 else 'trials'} {joined(told, 'and')} worse than "
-        "the base does where they are left out of the fit; do not rely on it in movements like that"
+        f"fibre {fibre}: the answer predicts {'trial' if len(told) == 1 else 'trials'} {joined(told)} worse than the "
+        "base does where they are left out of the fit; do not rely on it in movements like that"
         for fibre, told in found.items()
     ]
 

@@ -131,6 +131,11 @@ def replicated(c: Component) -> tuple[int, int]:
     return sum(row.replicates for row in told), len(told)
 
 
+def replicated_by(d: Diagnosis, fibre: str) -> list[str]:
+    """What of the answer a fibre replicates."""
+    return [c.members[0] for c in d.named if any(row.fibre == fibre and row.replicates for row in c.by_fibre)]
+
+
 def changed(d: Diagnosis) -> bool:
     """Whether the answer is another model than the base; where it is not, only one is shown."""
     return d.after.names != d.before.names or d.after.train_rmsd_f0 != d.before.train_rmsd_f0
