@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import least_squares
 
-from xb_muscle_ros.trials.trial import Trial
+from xb_muscle_ros.trials.trial import Phase, Trial
 
 Array = npt.NDArray[np.float64]
 
@@ -39,23 +39,38 @@ def straight_length(trial: Trial) -> Trial:
     return replace(trial, length_m=np.interp(trial.time_s, times, lengths))
 
 
-def told_calcium(trial: Trial, rise_s: float, fall_s: float) -> Trial:
-    """Without force while calcium comes and goes, for some time after each change: its time course is assumed.
+def until(trial: Trial, end_s: float) -> Trial:
+    """The part of a trial up to a time, s."""
+    kept, force = trial.time_s <= end_s, trial.force_time_s <= end_s
+    phases = tuple(
+        Phase(p.name, p.start_s, min(p.end_s, end_s)) for p in trial.facts.phases if p.start_s < end_s
+    )  # fmt: skip
+    return replace(
+        trial,
+        facts=replace(trial.facts, phases=phases),
+        time_s=trial.time_s[kept],
+        length_m=trial.length_m[kept],
+        force_time_s=trial.force_time_s[force],
+        force_n=trial.force_n[force],
+    )
 
-    What follows stays: force that has settled, and the passive force of a muscle that has relaxed.
-    """
-    steps = np.diff(trial.calcium_um)
-    kept = np.ones(trial.force_time_s.size, dtype=np.bool_)
-    for wanted, wait_s in ((steps > 0.0, rise_s), (steps < 0.0, fall_s)):
-        if np.any(wanted):
-            first = trial.calcium_time_s[1:][wanted][0]
-            kept &= (trial.force_time_s < first) | (trial.force_time_s >= first + wait_s)
-    return replace(trial, force_time_s=trial.force_time_s[kept], force_n=trial.force_n[kept])
+
+def _first(trial: Trial, chosen: npt.NDArray[np.bool_]) -> float:
+    """When one of some steps of calcium comes first, s; infinity where none does."""
+    at = np.flatnonzero(chosen)
+    return float(trial.calcium_time_s[at[0] + 1]) if at.size else np.inf
 
 
 def stimulated(trial: Trial) -> Trial:
-    """A trial with straight lengths, without force in the first second of stimulation and the two after its end."""
-    return told_calcium(straight_length(trial), 1.0, 2.0)
+    """A trial with straight lengths, without force in the first second of stimulation and without what follows it.
+
+    How fast calcium comes and goes is assumed, not known.
+    """
+    steps = np.diff(trial.calcium_um)
+    begin, end = _first(trial, steps > 0.0), _first(trial, steps < 0.0)
+    kept = (trial.force_time_s < begin) | (trial.force_time_s >= begin + 1.0)
+    told = replace(trial, force_time_s=trial.force_time_s[kept], force_n=trial.force_n[kept])
+    return until(straight_length(told), end)
 
 
 def at_rest(trials: Sequence[Trial], before_s: float) -> tuple[Array, Array]:
