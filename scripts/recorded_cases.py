@@ -163,15 +163,15 @@ def _single(name: str, model: str) -> Case:
 
 _RAT = """Shown: stretch-shorten-stretch at five pCa, 1 kHz. Concealed: the two triangles of 6.4 % L0 at pCa 4.5, 6.6
 and 9 (unsmoothed). The start is the released set."""
-_CAT = """Shown: the isometric reference at the short length (43) and active ramps of 3 mm/s to 9 mm from 0, 3 and 6 mm
-(50, 47, 45). Concealed: the isometric references at the long length, the ramps of 27 mm/s and the passive ramps. The
-effect is known: residual force enhancement, more force after an active stretch than isometrically at the same length.
-Assumed: calcium of 8 uM while stimulated; how fast it comes and goes is not known, so force counts from a second after
-stimulation began until its end. Lengths are straight between the corners, because the model would make 3 % F0 of the
-record's wobble; that wobble leaves each corner to about 10 ms, which is the SD of the time shift. The base is `3state_coop` with a
-passive spring that is exponential below its resting length (`_softplus`; resting length and sharpness from rest before stimulation at 0, 3 and
-6 mm, which is all that is shown of passive force) and a force-length relation (`filament_overlap`, fitted with the
-rest)."""
+_CAT = """Shown: the isometric reference at the short length (43) and active ramps of 3 mm/s to 9 mm from 0, 3 and 6
+mm (50, 47, 45). Concealed: the isometric references at the long length, the ramps of 27 mm/s and the passive ramps.
+The effect is known: residual force enhancement, more force after an active stretch than isometrically at the same
+length. Assumed: calcium of 8 uM while stimulated; how fast it comes and goes is not known, so force counts from a
+second after stimulation began until its end. Lengths are straight between the corners, because the model would make 3
+% F0 of the record's wobble; that wobble leaves each corner to about 10 ms, which is the SD of the time shift. The
+base is `3state_coop` with a passive spring that is exponential below its resting length (`_softplus`; resting length
+and sharpness from rest before stimulation at 0, 3 and 6 mm, which is all that is shown of passive force) and a force-
+length relation (`filament_overlap`, fitted with the rest)."""
 _RELAXED = """Cross-bridges are off (no attachment): the base is a soft parallel spring. Shown: ramps of 22.5 % L0 in
 0.1, 10 and 100 s; concealed: in 1 s. F0 is an assumption (50 kPa)."""
 _BLOCKED = """Shown: relaxed ramps of 0.1 and 10 s, blocked ones of 0.1 s at pCa 6.2, 5.8 and 4.4 and of 10 s at 4.4.
