@@ -65,6 +65,7 @@ setup(
             "hypothesis",
             "ruff",
             "mypy",
+            "import-linter",
             "types-PyYAML",
             "scipy-stubs",
             "colcon-core",

@@ -27,7 +27,7 @@ from xb_muscle_ros.fit.run import Settings, fit
 from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY, Scope
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.made import made
+from xb_muscle_ros.simulation.made import made
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.trial import Trial
 from xb_muscle_ros.work import Options, run

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from xb_muscle_ros.bench.golden import QUANTITIES, SETS, STEPPERS, Cell, compare
+from xb_muscle_ros.bench.golden import QUANTITIES, STEPPERS, Cell, compare
+from xb_muscle_ros.evaluate.golden import SETS
 
 # Table -> largest median and largest single error that are accepted.
 BARS = {

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.report import output
 from xb_muscle_ros.diagnose.report.traces import TrialTraces, read_traces
-from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
+from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure
 
 Array = npt.NDArray[np.float64]
 

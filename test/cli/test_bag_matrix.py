@@ -18,7 +18,7 @@ from xb_muscle_ros.cli.main import main
 from xb_muscle_ros.diagnose.report.traces import read_traces
 from xb_muscle_ros.models.fibre_file import changed, find_fibre_file, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.made import made
+from xb_muscle_ros.simulation.made import made
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.trial import Trial

@@ -11,7 +11,7 @@ import pytest
 from xb_muscle_ros.cli.main import main
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.simulation.offline import simulate_trial
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 

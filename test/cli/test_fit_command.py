@@ -133,7 +133,7 @@ def own_bags(tmp_path_factory: pytest.TempPathFactory) -> str:
 
     from xb_muscle_ros.models.fibre_file import changed
     from xb_muscle_ros.models.muscle import Muscle
-    from xb_muscle_ros.replay.offline import simulate_trial
+    from xb_muscle_ros.simulation.offline import simulate_trial
     from xb_muscle_ros.trials.bags import write_trial
     from xb_muscle_ros.trials.protocol import StretchShortenStretch
 

@@ -20,10 +20,10 @@ from xb_muscle_ros.diagnose.search.explore import fitted
 from xb_muscle_ros.diagnose.search.system import System
 from xb_muscle_ros.diagnose.search.whole import whole
 from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
-from xb_muscle_ros.replay.made import coloured_noise
 from xb_muscle_ros.scores.noise.model import NoiseModel
 from xb_muscle_ros.scores.noise.trials import by_windows
 from xb_muscle_ros.scores.noise.windows import Window
+from xb_muscle_ros.simulation.made import coloured_noise
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 
 # Made evidence that several test modules share, and makers of bags that the tests of trials have.

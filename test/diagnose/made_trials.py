@@ -12,7 +12,7 @@ from xb_muscle_ros.diagnose.intake import FibreStudy
 from xb_muscle_ros.fit.data import FitTrial, fit_trials
 from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.made import made
+from xb_muscle_ros.simulation.made import made
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.trial import Trial
 

@@ -14,7 +14,7 @@ from xb_muscle_ros.diagnose.next_experiment import menu, propose, scaled
 from xb_muscle_ros.diagnose.planning import _pairs
 from xb_muscle_ros.models.fibre_file import changed
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.simulation.offline import simulate_trial
 
 DRAG, TITIN, STIFFNESS, SHIFT = (
     Name.VISCOUS_DRAG, Name.ACTIVE_TITIN, Name.STATIC_CALCIUM_STIFFNESS, Name.PCA_SHIFT,

@@ -103,7 +103,7 @@ def test_a_variance_lost_in_rounding_puts_all_heads_at_one_strain(
 def test_deviation_and_its_slope(v: float) -> None:
     import sympy
 
-    from xb_muscle_ros.models.symbols import Deviation
+    from xb_muscle_ros.symbolic.symbols import Deviation
 
     assert ops.deviation(v) > 0.0
     if v >= 1e-3:

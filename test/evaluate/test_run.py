@@ -22,7 +22,7 @@ from xb_muscle_ros.evaluate.run import JOURNAL, evaluate
 from xb_muscle_ros.evaluate.writing import draw_figures, write, write_tables
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.simulation.offline import simulate_trial
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.trial import Trial
 from xb_muscle_ros.work import Options

@@ -20,7 +20,7 @@ from xb_muscle_ros.fit.run import Settings, fit
 from xb_muscle_ros.fit.table import table
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.made import made
+from xb_muscle_ros.simulation.made import made
 from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
 from xb_muscle_ros.work import Options
 

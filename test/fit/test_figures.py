@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from xb_muscle_ros.figures import fit_figures, fit_profiles
+from xb_muscle_ros.fit.figures import pages, profiles
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.report import as_json
 from xb_muscle_ros.fit.run import Fitted, Settings, fit
@@ -58,11 +58,11 @@ def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Drawn:
         made.canvas.draw()
         kept.append(made)
 
-    monkeypatch.setattr(fit_profiles, "save", keep)
-    monkeypatch.setattr(fit_figures, "save", keep)
+    monkeypatch.setattr(profiles, "save", keep)
+    monkeypatch.setattr(pages, "save", keep)
 
     def draw(rows: list[Any]) -> Any:
-        fit_profiles.draw_profiles(tmp_path / "p.png", {"parameters": rows, "level": 0.95})
+        profiles.draw_profiles(tmp_path / "p.png", {"parameters": rows, "level": 0.95})
         return kept[-1]
 
     draw.kept = kept  # type: ignore[attr-defined]
@@ -115,7 +115,7 @@ def test_a_start_beyond_the_axis_is_an_arrow_with_its_value(drawn: Drawn) -> Non
 
 @pytest.mark.parametrize(("low", "high"), [(1.0, 8.0), (0.02, 3e5), (7e-6, 9e-5), (3.1, 28.0)])
 def test_log_ticks_are_few_round_and_inside(low: float, high: float) -> None:
-    ticks = fit_profiles.log_ticks(low, high)
+    ticks = profiles.log_ticks(low, high)
     assert 2 <= len(ticks) <= 4
     assert all(low <= tick <= high for tick in ticks)
     assert all(f"{tick:e}"[0] in "1235" for tick in ticks)
@@ -128,7 +128,7 @@ def test_residuals_of_the_fit_fill_their_axis_however_far_off_the_start(
     fitted: Fitted = fit(
         replace(problem, coordinates=tuple(far)), Settings(1, level=None), Options(processes=0, quiet=True)
     )
-    fit_figures.draw(tmp_path, fitted, as_json(fitted, {}))
+    pages.draw(tmp_path, fitted, as_json(fitted, {}))
     made = drawn.kept[0]  # type: ignore[attr-defined]
     for axes in made.axes[1::2]:
         lines = [line for line in axes.lines if line.get_linestyle() == "-" and len(line.get_xdata()) > 2]
@@ -140,4 +140,4 @@ def test_residuals_of_the_fit_fill_their_axis_however_far_off_the_start(
 
 
 def test_correlations_close_to_one_are_not_rounded_to_it() -> None:
-    assert [fit_figures._number(v) for v in (0.996, -0.42, 1.0)] == [".99", "−.42", "1.00"]
+    assert [pages._number(v) for v in (0.996, -0.42, 1.0)] == [".99", "−.42", "1.00"]

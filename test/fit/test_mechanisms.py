@@ -21,7 +21,7 @@ from xb_muscle_ros.models.catalogue import CATALOGUE, without_effect_line
 from xb_muscle_ros.models.fibre_file import Fibre, borrowed_line, changed, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.registry import EXTRAS, SWAPS
-from xb_muscle_ros.replay.made import made
+from xb_muscle_ros.simulation.made import made
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.work import Options
 

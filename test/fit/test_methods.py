@@ -24,7 +24,7 @@ from xb_muscle_ros.fit.solve import Objective, descend
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.made import made
+from xb_muscle_ros.simulation.made import made
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.work import Options
 

@@ -24,8 +24,8 @@ from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.measurement.faults import FAULTS
 from xb_muscle_ros.models.fibre_file import Fibre, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.made import coloured_noise
 from xb_muscle_ros.scores.noise.autocovariance import autocovariance
+from xb_muscle_ros.simulation.made import coloured_noise
 from xb_muscle_ros.trials.trial import Trial, TrialFacts
 
 Maker = Callable[..., list[Trial]]

@@ -66,7 +66,7 @@ def test_compiled_right_hand_side_is_the_blocks_own(
     values |= {e.symbols[name]: value for name, value in muscle.fibre.values.items()}
     values |= {e.shift: z[5], e.symbols["velocity"]: velocity, e.symbols["calcium"]: calcium}
     from xb_muscle_ros.mechanisms import ops
-    from xb_muscle_ros.models.symbols import Decay, HyperbolicTangent, Logistic, Positive, Softplus
+    from xb_muscle_ros.symbolic.symbols import Decay, HyperbolicTangent, Logistic, Positive, Softplus
 
     ours = np.zeros(6)
     muscle.code.rhs(z, velocity, calcium, muscle.parameters, ours)

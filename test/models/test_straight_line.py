@@ -20,7 +20,7 @@ from xb_muscle_ros.models.straight_line import straight_line
 
 _FUNCTIONS = '''
 import math
-from xb_muscle_ros.models.intrinsics import limited
+from xb_muscle_ros.symbolic.intrinsics import limited
 
 def both(x, y, p):
     """A pair."""

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.models import intrinsics
 from xb_muscle_ros.models.codegen import module_text
 from xb_muscle_ros.models.composition import Model
 from xb_muscle_ros.models.muscle import GUARD, SCRATCH_ROWS
+from xb_muscle_ros.symbolic import intrinsics
 
 
 def _as_compiled(function: Callable[..., float], beyond: float) -> Callable[..., float]:

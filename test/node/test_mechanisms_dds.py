@@ -13,7 +13,7 @@ from xb_muscle_ros.models.fibre_writing import write_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.parameters import complete
 from xb_muscle_ros.models.registry import with_mechanisms
-from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.simulation.offline import simulate_trial
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 
 FIBRE = "18Dec2017a"

@@ -92,7 +92,7 @@ def test_force_over_dds_is_offline_force_bit_for_bit(node: Any, muscle: Muscle) 
 
 def test_the_offline_replay_agrees_with_the_node(muscle: Muscle) -> None:
     """What `replay` computes offline is the same loop."""
-    from xb_muscle_ros.replay.offline import simulate_trial
+    from xb_muscle_ros.simulation.offline import simulate_trial
 
     trial = wavy_trial()
     assert_same_bits(simulate_trial(muscle, trial), loop(muscle, trial))

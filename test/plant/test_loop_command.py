@@ -15,7 +15,7 @@ pytest.importorskip("mujoco", reason="needs the extra mujoco")
 
 def draw_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave the figure out where it is not what is tested; it takes most of the time."""
-    monkeypatch.setattr("xb_muscle_ros.figures.loop_figure.draw_loop", lambda *_: None)
+    monkeypatch.setattr("xb_muscle_ros.plant.figure.draw_loop", lambda *_: None)
 
 
 def test_files_are_identical_when_repeated(

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.simulation.offline import simulate_trial
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.between_samples import AFTER_S, FINE_S, STRAIGHT_L0, refined, with_corners
 from xb_muscle_ros.trials.completing import Known

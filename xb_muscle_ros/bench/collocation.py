@@ -44,7 +44,7 @@ _OPTIONS = {
     "ipopt.bound_push": 1e-9,
     "ipopt.bound_frac": 1e-9,
 }
-# The models' own functions (see models.symbols); CasADi differentiates them by itself.
+# The models' own functions (see symbolic.symbols); CasADi differentiates them by itself.
 _FUNCTIONS = {
     "Decay": lambda z, k: ca.exp(-ca.fabs(k * z)),
     "Softplus": lambda z, k, decay: ca.fmax(z, 0) + ca.log1p(decay) / k,

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from xb_muscle_ros.bench.measure import Figure
-from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, THIRD, figure, save
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Array, Muscle
 from xb_muscle_ros.models.registry import compose
+from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, THIRD, figure, save
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 
 _DURATION_S = 2.34

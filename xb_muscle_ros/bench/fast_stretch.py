@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from xb_muscle_ros.bench.measure import Figure
-from xb_muscle_ros.figures.style import MODEL, SECOND, figure, save
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Array, Muscle
+from xb_muscle_ros.plotting.style import MODEL, SECOND, figure, save
 
 SPEEDS_L0_PER_S = (0.1, 0.3, 1.0, 3.0, 10.0)
 STRETCH_L0 = 0.1

@@ -29,8 +29,8 @@ from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.models.fibre_file import Fibre, load_fibre
 from xb_muscle_ros.models.muscle import Array, Muscle
 from xb_muscle_ros.progress import Progress
-from xb_muscle_ros.replay.made import made
 from xb_muscle_ros.scores.rmsd import MARGIN_S
+from xb_muscle_ros.simulation.made import made
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 
 PCAS = (4.5, 6.1, 6.2, 6.3, 6.4, 6.6)

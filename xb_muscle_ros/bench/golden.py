@@ -17,21 +17,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.evaluate.golden import METHODS, SETS
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Array, Muscle
 from xb_muscle_ros.trials.protocol import SPEED_L0_PER_S, TEST_DURATION_S
 
-# Name of a golden table -> parameter set of the fibre files.
-SETS = {
-    "3state_coop": "3state_coop",
-    "3state_coop_v3": "3state_coop_v3",
-    "2state_xb": "2state",
-    "3state_coop_discretised": "3state_coop",
-    "4state_coop": "4state_coop",
-    "hill_se": "hill_se",
-}
-# Tables that were not made with the Gaussian form. Their grid: 1,000 bins over ±15; nothing but force was smoothed.
-METHODS = {"3state_coop_discretised": "characteristics", "4state_coop": "characteristics"}
+# Of the tables made on a grid: 1,000 bins over ±15; nothing but force was smoothed.
 GRID = {"bins": 1000.0, "strain_range": 15.0, "smooth_stiffness": 0.0}
 # The authors leave out the active force of their Hill-type model at this pCa; its floor of activation stays otherwise.
 _PASSIVE = {("hill_se", 9.0)}

@@ -150,7 +150,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _figures(folder: Path, fitted: Any, found: dict[str, Any]) -> list[Path]:
-    from xb_muscle_ros.figures.fit_figures import draw
+    from xb_muscle_ros.fit.figures.pages import draw
 
     return draw(folder, fitted, found)
 

@@ -52,8 +52,8 @@ def add(subparsers: Subparsers) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run all models, print the table, write the files."""
     from xb_muscle_ros.errors import UserError
-    from xb_muscle_ros.figures.loop_figure import draw_loop
     from xb_muscle_ros.files import matching, refuse_older
+    from xb_muscle_ros.plant.figure import draw_loop
     from xb_muscle_ros.plant.loop import DURATION_S, run_ankle, run_knee
     from xb_muscle_ros.plant.plant import Plant
     from xb_muscle_ros.plant.reach import beyond_in

@@ -35,8 +35,8 @@ def add(subparsers: Subparsers) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Replay, print the table, write the files."""
     from xb_muscle_ros.errors import UserError
-    from xb_muscle_ros.replay.offline import one_for_all, pushing
     from xb_muscle_ros.replay.run import Player, check_room, replay, write_results
+    from xb_muscle_ros.simulation.offline import one_for_all, pushing
 
     if not 1 <= arguments.substeps <= 10000:
         raise UserError(f"--substeps is {arguments.substeps}; allowed is 1 to 10000")

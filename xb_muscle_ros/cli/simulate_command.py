@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.errors import naming
     from xb_muscle_ros.files import refuse_older
     from xb_muscle_ros.models.muscle import Muscle
-    from xb_muscle_ros.replay.offline import as_simulated, pushing
+    from xb_muscle_ros.simulation.offline import as_simulated, pushing
     from xb_muscle_ros.trials.bags import write_trial
     from xb_muscle_ros.trials.protocol import ALLOWED, StretchShortenStretch
 

@@ -11,7 +11,7 @@ import numpy as np
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.simulation.offline import simulate_trial
 from xb_muscle_ros.trials.trial import Array, Phase, Trial, TrialFacts
 
 # Menu: speed and amplitude of a ramp, hold after it, length the fibre starts from.

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 from xb_muscle_ros.mechanisms.base import GaussianSpread, Parameter, Quantities, State, StrainRate
 from xb_muscle_ros.mechanisms.ops import Expr
-
-if TYPE_CHECKING:
-    from xb_muscle_ros.models.composition import Composition
 
 
 class Moments(NamedTuple):
@@ -77,24 +74,23 @@ class Representation(ABC):
         parameters: rows of the parameter table that belong to the method.
         states: of a fixed number of states; a grid's bins are not among them.
         settling: see `Settling`.
+        remap: how bins are brought back after a step: see `models.grid_codegen`; None: there are none, and everything
+            is an expression of the states.
     """
 
     name: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     states: ClassVar[tuple[State, ...]] = ()
     settling: ClassVar[Settling] = Settling(rate=1e-9, step_s=None)
+    remap: ClassVar[str | None] = None
 
     @abstractmethod
     def fluxes(self, q: Quantities, ways: Ways) -> Fluxes:
         """Heads per second by the ways of the model."""
 
-    @abstractmethod
-    def module_text(self, model: Composition, smooth: bool) -> str:
-        """Text of the module that steps a model: see `models.codegen`."""
-
-    def state_rows(self, model: Composition, values: Mapping[str, float]) -> tuple[State, ...]:
-        """The integrated states of a model with these parameter values, in order."""
-        return model.states
+    def state_rows(self, states: tuple[State, ...], values: Mapping[str, float]) -> tuple[State, ...]:
+        """The integrated states with these parameter values, in order, of a model with such states of its own."""
+        return states
 
 
 class MomentRepresentation(Representation):
@@ -119,9 +115,3 @@ class MomentRepresentation(Representation):
         for rate in ways.detach:
             kinetics = kinetics.plus(self.outflow(q, rate), -1)
         return Fluxes(kinetics, torn.m0, back.m0)
-
-    def module_text(self, model: Composition, smooth: bool) -> str:
-        """Everything is an expression of the states: one flat right-hand side."""
-        from xb_muscle_ros.models.codegen import flat_module
-
-        return flat_module(model, smooth)

@@ -9,13 +9,10 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from xb_muscle_ros.distribution.base import Fluxes, Moments, Representation, Settling, Ways
 from xb_muscle_ros.mechanisms.base import Parameter, Quantities, State
-
-if TYPE_CHECKING:
-    from xb_muscle_ros.models.composition import Composition
 
 BINS = Parameter("bins", "1", "points of the strain grid", 8.0, 100000.0, 200.0, "van der Zee et al. 2026")
 RANGE = Parameter(
@@ -46,22 +43,14 @@ class Grid(Representation):
     # The step's matrix leaves the heads' feedback on their own attachment out: variable steps would grow to the edge of
     # stability and stay restless there, steps of 1 ms come to rest.
     settling = Settling(rate=1e-6, step_s=1e-3)
-    # Which text brings the bins back after a step: see `models.grid_codegen`.
-    remap: ClassVar[str]
 
     def fluxes(self, q: Quantities, ways: Ways) -> Fluxes:
         """Sums over bins, which are not expressions: symbols that the compiled step fills in."""
         return Fluxes(Moments(q.kin0, q.kin1, q.kin2), q.torn_off, q.reattached)
 
-    def state_rows(self, model: Composition, values: Mapping[str, float]) -> tuple[State, ...]:
+    def state_rows(self, states: tuple[State, ...], values: Mapping[str, float]) -> tuple[State, ...]:
         """Bins first, then the blocks' states, then the shift of the grid."""
-        return _rows(int(values["bins"]), values["strain_range"], model.states)
-
-    def module_text(self, model: Composition, smooth: bool) -> str:
-        """Scalar parts as expressions, bins in loops."""
-        from xb_muscle_ros.models.grid_codegen import grid_module
-
-        return grid_module(model, smooth, self.remap)
+        return _rows(int(values["bins"]), values["strain_range"], states)
 
 
 class Characteristics(Grid):

@@ -15,13 +15,13 @@ from xb_muscle_ros.evaluate.checks import check_trial
 from xb_muscle_ros.evaluate.fibre_cache import all_fibre_files, available_sets, digest_of, fibre_of_file, muscle_of
 from xb_muscle_ros.evaluate.sets import NoFibreFile, file_serving
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.offline import pushing, simulate_trial
 from xb_muscle_ros.scores.conditions import nominal
 from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.scores.readout import read_off
 from xb_muscle_ros.scores.redevelopment import redevelopment, restretch_end, still_until
 from xb_muscle_ros.scores.rmsd import force_rmsd, short_windows, windows
 from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN, ForceNoise, force_noise
+from xb_muscle_ros.simulation.offline import pushing, simulate_trial
 from xb_muscle_ros.trials.bag_files import METADATA
 from xb_muscle_ros.trials.bag_reading import TrialBag
 from xb_muscle_ros.trials.completing import CONDITIONING_FOUND, Known, pca_of

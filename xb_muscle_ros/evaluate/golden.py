@@ -4,11 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from xb_muscle_ros.bench.golden import METHODS, SETS
 from xb_muscle_ros.evaluate.paper import Source
 from xb_muscle_ros.evaluate.sets import ModelSet
 from xb_muscle_ros.evaluate.srs_table import SrsTable
 
+# Name of a golden table -> parameter set of the fibre files.
+SETS = {
+    "3state_coop": "3state_coop",
+    "3state_coop_v3": "3state_coop_v3",
+    "2state_xb": "2state",
+    "3state_coop_discretised": "3state_coop",
+    "4state_coop": "4state_coop",
+    "hill_se": "hill_se",
+}
+# Tables that were not made with the Gaussian form.
+METHODS = {"3state_coop_discretised": "characteristics", "4state_coop": "characteristics"}
 OURS, GOLDEN = "ours", "released output"
 """Names of the two sources."""
 

@@ -21,15 +21,12 @@ from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0
 from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.scores.redevelopment import Redevelopment, redevelopment
-from xb_muscle_ros.scores.stiffness import WINDOW_S
-from xb_muscle_ros.trials.protocol import SPEED_L0_PER_S
+from xb_muscle_ros.simulation.stretches import followed, onset_stiffness, stretched_and_back
 from xb_muscle_ros.trials.trial import Array
 
 AMPLITUDES_L0 = (0.0, 0.0012, 0.0038, 0.0121, 0.0216, 0.0288, 0.0383, 0.0532, 0.0682)
 RECOVERIES_S = (0.001, 0.01, 0.05, 0.1, 0.2, 0.316, 0.5, 1.0, 3.16, 10.0)
 PCAS = (4.5, 6.1, 6.2, 6.3, 6.4, 6.6, 9.0)
-# Samples that a stretch's SRS is fitted to: 1 kHz, the ten after onset.
-_SAMPLE_S = np.arange(1, 11) * (WINDOW_S / 10.0)
 # Release and restretch as in k_tr recordings of rat soleus: a fifth of the length, for 20 ms.
 _RELEASE_L0, _RELEASE_RAMP_S, _RELEASED_S, _REDEVELOP_S = 0.20, 0.001, 0.020, 5.0
 
@@ -88,7 +85,7 @@ def _simulated(muscle: Muscle, task: Mapping[str, Any]) -> dict[str, Any]:
     srs_test = np.empty((recoveries.size, len(task["amplitudes_l0"])))
     for j, amplitude in enumerate(task["amplitudes_l0"]):
         state = stretched_and_back(muscle, settled, amplitude, calcium) if amplitude else settled
-        for i, recovered in enumerate(_followed(muscle, state, recoveries, 0.0 * recoveries, calcium)):
+        for i, recovered in enumerate(followed(muscle, state, recoveries, 0.0 * recoveries, calcium)):
             srs_test[i, j] = onset_stiffness(muscle, recovered, calcium)
     k_tr, problem = None, None
     try:
@@ -132,37 +129,10 @@ def table(label: str, fibres: Sequence[Fibre], made: Sequence[Task], results: Se
     return SrsTable(label, np.array(pcas), recoveries, amplitudes, held)
 
 
-def _followed(muscle: Muscle, state: Array, time_s: Array, length_l0: Array, calcium: float) -> Array:
-    """States at times from now, straight from one length to the next; every time is a corner, where steps land."""
-    corner_s = np.concatenate([[0.0], time_s])
-    lengths = np.concatenate([state[-3:-2], length_l0])
-    return muscle.follow(state, corner_s, lengths, np.full(corner_s.size, calcium), time_s)
-
-
-def waited(muscle: Muscle, state: Array, duration_s: float, calcium: float) -> Array:
-    """State after holding the length."""
-    after: Array = _followed(muscle, state, np.array([duration_s]), state[-3:-2], calcium)[-1]
-    return after
-
-
-def stretched_and_back(muscle: Muscle, state: Array, amplitude_l0: float, calcium: float) -> Array:
-    """State after a stretch of an amplitude (L0) and the way back, at the paper's speed."""
-    ramp = amplitude_l0 / SPEED_L0_PER_S
-    after: Array = _followed(muscle, state, np.array([ramp, 2.0 * ramp]), np.array([amplitude_l0, 0.0]), calcium)[-1]
-    return after
-
-
-def onset_stiffness(muscle: Muscle, state: Array, calcium: float) -> float:
-    """SRS of a stretch that begins at this state, F0/L0."""
-    lengths = state[-3] + SPEED_L0_PER_S * _SAMPLE_S
-    force = muscle.outputs_of(_followed(muscle, state, _SAMPLE_S, lengths, calcium))["force_f0"]
-    return float(np.polyfit(lengths, force, 1)[0])
-
-
 def _redeveloped(muscle: Muscle, state: Array, calcium: float) -> Redevelopment | Missing:
     corner_s = np.cumsum([_RELEASE_RAMP_S, _RELEASED_S, _RELEASE_RAMP_S])
-    away = _followed(muscle, state, corner_s, np.array([-_RELEASE_L0, -_RELEASE_L0, 0.0]), calcium)[-1]
+    away = followed(muscle, state, corner_s, np.array([-_RELEASE_L0, -_RELEASE_L0, 0.0]), calcium)[-1]
     time_s = np.arange(1, round(_REDEVELOP_S * 1e3) + 1) * 1e-3
-    states = _followed(muscle, away, time_s, 0.0 * time_s, calcium)
+    states = followed(muscle, away, time_s, 0.0 * time_s, calcium)
     force = muscle.outputs_of(states)["force_f0"]
     return redevelopment(time_s, force, 0.0, _REDEVELOP_S)

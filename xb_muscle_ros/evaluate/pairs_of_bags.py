@@ -11,9 +11,9 @@ import numpy as np
 from xb_muscle_ros.evaluate.bags import Found, Task, file_state, stretch_of, trial_of_task
 from xb_muscle_ros.evaluate.fibre_cache import available_sets, muscle_of
 from xb_muscle_ros.evaluate.sets import file_serving
-from xb_muscle_ros.replay.offline import simulate_trial
 from xb_muscle_ros.scores.enhancement import AFTER_S, Side, enhancement
 from xb_muscle_ros.scores.standard_error import force_noise
+from xb_muscle_ros.simulation.offline import simulate_trial
 from xb_muscle_ros.trials.bag_reading import TrialBag
 from xb_muscle_ros.trials.trial import Trial
 

@@ -12,6 +12,7 @@ import numpy as np
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.evaluate import bags as bag_tasks
 from xb_muscle_ros.evaluate import grid, more_scores, pairs_of_bags, sections
+from xb_muscle_ros.evaluate.figures.srs import NOTHING_TO_DRAW, drawable
 from xb_muscle_ros.evaluate.golden import GOLDEN, OURS, golden_sources
 from xb_muscle_ros.evaluate.paper import Source, compare, readings_table
 from xb_muscle_ros.evaluate.results import Request, Results
@@ -19,7 +20,6 @@ from xb_muscle_ros.evaluate.sets import file_serving, gather, served_line, value
 from xb_muscle_ros.evaluate.srs_scores import ALL_READINGS, READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, read_table, read_tables
 from xb_muscle_ros.evaluate.trials import MEASURED, Trials, duplicates, srs_table
-from xb_muscle_ros.figures.evaluate_srs import NOTHING_TO_DRAW, drawable
 from xb_muscle_ros.models.fibre_file import fibre_folders, find_fibre_file, load_fibre
 from xb_muscle_ros.scores.enhancement import AFTER_S
 from xb_muscle_ros.trials.bags import find_bags

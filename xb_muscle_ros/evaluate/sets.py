@@ -16,18 +16,11 @@ from xb_muscle_ros.models.fibre_file import Fibre, base_set, find_fibre_file, lo
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.registry import base_of, compose, model_of_set
 from xb_muscle_ros.models.strain_bins import wide_bins_line
+from xb_muscle_ros.models.titles import title_of
 
 ORDER = ("hill", "hill_se", "2state", "2state_coop", "3state_coop", "4state_coop")
 """Models by the number of their states, simplest first (van der Zee et al. 2026)."""
 REFERENCE_OF_AIC = "hill"
-_NAMES = {
-    "hill": "Hill (no SE)",
-    "hill_se": "Hill (with SE)",
-    "2state": "2-state XB",
-    "2state_coop": "2-state XB coop",
-    "3state_coop": "3-state XB coop",
-    "4state_coop": "4-state XB coop",
-}
 # What was fitted for each fibre (van der Zee et al. 2026, Methods); the rest came from the literature.
 _FITTED = frozenset(
     "f k11 k21 k22 dLcrit kon koop kappa n JF vmax kpe Fpe0 kse kse0".split()  # noqa: SIM905 - reads as the paper has it
@@ -54,8 +47,7 @@ class ModelSet:
     @property
     def title(self) -> str:
         """What figures and tables call it."""
-        model = model_of_set(self.name)
-        return _NAMES.get(model, model) + self.name[len(model) :].replace("_", " ")
+        return title_of(self.name)
 
     @property
     def rank(self) -> int:

@@ -55,9 +55,9 @@ def write_tables(out: Path, results: Results) -> list[Path]:
 
 def draw_figures(out: Path, results: Results) -> list[Path]:
     """Draw what there is to draw; PNG, and PDF beside it."""
-    from xb_muscle_ros.figures.evaluate_force import draw_force
-    from xb_muscle_ros.figures.evaluate_srs import draw_srs
-    from xb_muscle_ros.figures.evaluate_surfaces import draw_surfaces
+    from xb_muscle_ros.evaluate.figures.force import draw_force
+    from xb_muscle_ros.evaluate.figures.srs import draw_srs
+    from xb_muscle_ros.evaluate.figures.surfaces import draw_surfaces
 
     made = []
     force = results.sections.get("force_rmsd", {})

@@ -18,7 +18,7 @@ from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.fit.uncertainty import correlation
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.strain_bins import wide_bins_line
-from xb_muscle_ros.replay.offline import one_for_all, pushing_line
+from xb_muscle_ros.simulation.offline import one_for_all, pushing_line
 
 # From here on two coordinates are told to be hardly told apart.
 _TWINS = 0.95

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError, naming
-from xb_muscle_ros.evaluate.grid import onset_stiffness, stretched_and_back, waited
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.simulation.stretches import onset_stiffness, stretched_and_back, waited
 
 Array = npt.NDArray[np.float64]
 

@@ -49,7 +49,7 @@ def tanh(z: Expr) -> Expr:
     """Hyperbolic tangent."""
     if _numeric(z):
         return math.tanh(z)
-    from xb_muscle_ros.models.symbols import HyperbolicTangent
+    from xb_muscle_ros.symbolic.symbols import HyperbolicTangent
 
     return HyperbolicTangent(z)
 
@@ -75,10 +75,10 @@ def asinh(z: Expr) -> Expr:
 def tangent_sinh(z: Expr) -> Expr:
     """Hyperbolic sine up to |z| = 12, its tangent there beyond."""
     if _numeric(z):
-        from xb_muscle_ros.models.intrinsics import tangent_sinh as compute
+        from xb_muscle_ros.symbolic.intrinsics import tangent_sinh as compute
 
         return float(compute(z))
-    from xb_muscle_ros.models.symbols import TangentSinh
+    from xb_muscle_ros.symbolic.symbols import TangentSinh
 
     return TangentSinh(z)
 
@@ -86,10 +86,10 @@ def tangent_sinh(z: Expr) -> Expr:
 def limited(z: Expr) -> Expr:
     """Z up to 12, levelling off at 15 beyond."""
     if _numeric(z):
-        from xb_muscle_ros.models.intrinsics import limited as compute
+        from xb_muscle_ros.symbolic.intrinsics import limited as compute
 
         return float(compute(z))
-    from xb_muscle_ros.models.symbols import Limited
+    from xb_muscle_ros.symbolic.symbols import Limited
 
     return Limited(z)
 
@@ -101,10 +101,10 @@ def deviation(variance: Expr) -> Expr:
     positive, but vanishing, below.
     """
     if _numeric(variance):
-        from xb_muscle_ros.models.intrinsics import deviation as compute
+        from xb_muscle_ros.symbolic.intrinsics import deviation as compute
 
         return float(compute(variance))
-    from xb_muscle_ros.models.symbols import Deviation
+    from xb_muscle_ros.symbolic.symbols import Deviation
 
     return Deviation(variance)
 
@@ -113,7 +113,7 @@ def softplus(z: Expr, sharpness: Expr) -> Expr:
     """Smooth positive part ln(1 + exp(sharpness z))/sharpness, in the unit of z."""
     if _numeric(z, sharpness):
         return max(z, 0.0) + math.log1p(math.exp(-abs(sharpness * z))) / sharpness
-    from xb_muscle_ros.models.symbols import Decay, Softplus
+    from xb_muscle_ros.symbolic.symbols import Decay, Softplus
 
     return Softplus(z, sharpness, Decay(z, sharpness))
 
@@ -122,7 +122,7 @@ def positive(z: Expr) -> Expr:
     """Positive part of z, 0 below 0."""
     if _numeric(z):
         return max(z, 0.0)
-    from xb_muscle_ros.models.symbols import Positive
+    from xb_muscle_ros.symbolic.symbols import Positive
 
     return Positive(z)
 
@@ -131,7 +131,7 @@ def above(z: Expr) -> Expr:
     """1 where z > 0, else 0."""
     if _numeric(z):
         return 1.0 if z > 0.0 else 0.0
-    from xb_muscle_ros.models.symbols import UnitStep
+    from xb_muscle_ros.symbolic.symbols import UnitStep
 
     return UnitStep(z)
 
@@ -139,9 +139,9 @@ def above(z: Expr) -> Expr:
 def smooth_series_extension(force: Expr, kse0: Expr, sharpness: Expr) -> Expr:
     """Integral of dF/(softplus(F, sharpness) + kse0) from 0 to force: extension times kse of the smoothed spring."""
     if _numeric(force, kse0, sharpness):
-        from xb_muscle_ros.models.intrinsics import smooth_series_extension as compute
+        from xb_muscle_ros.symbolic.intrinsics import smooth_series_extension as compute
 
         return float(compute(force, kse0, sharpness))
-    from xb_muscle_ros.models.symbols import SmoothSeriesExtension
+    from xb_muscle_ros.symbolic.symbols import SmoothSeriesExtension
 
     return SmoothSeriesExtension(force, kse0, sharpness)

@@ -13,8 +13,8 @@ from xb_muscle_ros.models.composition import INPUTS, OUTPUTS, Equations, Model
 from xb_muscle_ros.models.elimination import Elimination
 from xb_muscle_ros.models.factoring import replaced
 from xb_muscle_ros.models.program import Program, c, jacobian, program, python
-from xb_muscle_ros.models.symbols import CALLS
 from xb_muscle_ros.stepping import ros3
+from xb_muscle_ros.symbolic.symbols import CALLS
 
 _HEADER = '''"""Generated from the mechanisms of model {name}{smooth}; do not edit."""
 
@@ -23,7 +23,7 @@ import math
 import numpy as np
 from numba import get_thread_id, njit, prange
 
-from xb_muscle_ros.models.intrinsics import (
+from xb_muscle_ros.symbolic.intrinsics import (
     {intrinsics},
 )
 from xb_muscle_ros.models.straight_line import straight_line
@@ -80,7 +80,7 @@ def flat_module(model: Model, smooth: bool) -> str:
 
 def c_text(model: Model, smooth: bool) -> str:
     """The same right-hand side in C, for comparison: `void rhs(const double *z, double velocity, ...)`."""
-    from xb_muscle_ros.models.intrinsics import C_SOURCE
+    from xb_muscle_ros.symbolic.intrinsics import C_SOURCE
 
     e = model.equations(smooth)
     lines = _scalars(e, "z", c_style=True)

@@ -22,7 +22,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.registry import compose
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-_SOURCES = ("mechanisms", "distribution", "models", "stepping")
+_SOURCES = ("symbolic", "mechanisms", "distribution", "models", "stepping")
 
 
 @functools.lru_cache(maxsize=1)

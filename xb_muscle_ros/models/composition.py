@@ -140,7 +140,7 @@ class Composition(Model):
 
     def state_rows(self, values: Mapping[str, float]) -> tuple[State, ...]:
         """See the base class."""
-        return self.representation.state_rows(self, values)
+        return self.representation.state_rows(self.states, values)
 
     @property
     def settling(self) -> Settling:
@@ -160,8 +160,15 @@ class Composition(Model):
         return equations(self, smooth)
 
     def module_text(self, smooth: bool) -> str:
-        """See the base class."""
-        return self.representation.module_text(self, smooth)
+        """See the base class: one flat right-hand side, or scalar parts as expressions and bins in loops."""
+        remap = self.representation.remap
+        if remap is None:
+            from xb_muscle_ros.models.codegen import flat_module
+
+            return flat_module(self, smooth)
+        from xb_muscle_ros.models.grid_codegen import grid_module
+
+        return grid_module(self, smooth, remap)
 
 
 # Moments of the other half-sarcomere are integrated about a moving point, where an error within the tolerance may carry

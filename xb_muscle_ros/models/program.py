@@ -15,7 +15,7 @@ from sympy.printing.pycode import PythonCodePrinter
 from sympy.simplify.cse_opts import sub_post
 
 from xb_muscle_ros.models.factoring import Factors, replaced, signed
-from xb_muscle_ros.models.symbols import CALLS
+from xb_muscle_ros.symbolic.symbols import CALLS
 
 Line = tuple[Any, Any]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure, save
+from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure, save
 from xb_muscle_ros.prove.composite_counting import LARGE_F0
 from xb_muscle_ros.prove.composite_judging import JudgedComposite
 from xb_muscle_ros.prove.counting import Score

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.names import FAMILY, MECHANISMS, Name
 from xb_muscle_ros.diagnose.result import Verdict
-from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure, save
+from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure, save
 from xb_muscle_ros.prove.judging import Judged
 
 Array = npt.NDArray[np.float64]

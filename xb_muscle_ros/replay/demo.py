@@ -9,8 +9,8 @@ from pathlib import Path
 
 from xb_muscle_ros.models.fibre_file import fibre_folders, find_fibre_file, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.offline import simulate_trial
 from xb_muscle_ros.replay.run import replay, write_results
+from xb_muscle_ros.simulation.offline import simulate_trial
 from xb_muscle_ros.trials.bags import read_trial, write_trial
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.readers.csv import read_csv

@@ -11,8 +11,8 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import matching, refuse_older
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.offline import simulate_trial
 from xb_muscle_ros.replay.report import Record, add_relative_stiffness, record, table, write_json
+from xb_muscle_ros.simulation.offline import simulate_trial
 from xb_muscle_ros.trials.bag_files import plain, remove_results
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.simulated import Simulated
@@ -126,13 +126,13 @@ def write_results(folder: Path, trials: Sequence[Trial], results: Replay, live: 
         results: of the replay.
         live: a second replay of the same trials, drawn on top.
     """
-    from xb_muscle_ros.figures.evaluate_look import label
-    from xb_muscle_ros.figures.replay_figure import draw_replay
+    from xb_muscle_ros.models.titles import title_of
+    from xb_muscle_ros.replay.figure import draw_replay
 
     remove_results(older_results(folder))
     facts = {"fibre": results.fibre.name, "model": results.fibre.model, "method": results.fibre.method}
     write_json(folder / "replay.json", results.records, {**facts, "live": results.live, "source": results.fibre.source})
-    name = f"{label(results.fibre.model)} ({'live' if results.live else 'offline'})"
+    name = f"{title_of(results.fibre.model)} ({'live' if results.live else 'offline'})"
     pages = draw_replay(folder / "replay.png", trials, results.simulated, name, live.simulated if live else None)
     for trial, simulated in zip(trials, results.simulated, strict=True):
         write_trial(_bag(folder, trial.facts.trial), trial, simulated)

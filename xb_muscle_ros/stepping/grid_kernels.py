@@ -27,7 +27,7 @@ TORN = -1
 IS_STEP = (False,)
 ERROR_SHARE = 0.0
 
-# Of `models.intrinsics`.
+# Of `symbolic.intrinsics`.
 limited: Callable[[float], float]
 # Scalar functions of the model, each returning a tuple; see `models.grid_codegen`.
 table_slopes: Callable[..., Any]

@@ -10,7 +10,7 @@ from xb_muscle_ros.diagnose.noise.closure import by_distribution, closure_error,
 from xb_muscle_ros.diagnose.search.system import System
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.simulation.offline import simulate_trial
 
 
 def recorded(given: Fibre) -> System:

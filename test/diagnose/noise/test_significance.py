@@ -15,9 +15,9 @@ from xb_muscle_ros.diagnose.noise.cells import Residual, cut, rms
 from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.diagnose.noise.significance import family_wise, null_residuals, significance, step_down
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.replay.made import coloured_noise
 from xb_muscle_ros.scores.noise.model import NoiseModel
 from xb_muscle_ros.scores.noise.windows import Window
+from xb_muscle_ros.simulation.made import coloured_noise
 
 Array = npt.NDArray[np.float64]
 

@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from xb_muscle_ros.mechanisms.extra import InSeries
-from xb_muscle_ros.models import intrinsics
 from xb_muscle_ros.models.composition import INPUTS, OUTPUTS, Equations
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.program import python
 from xb_muscle_ros.models.registry import compose, model_of_set
+from xb_muscle_ros.symbolic import intrinsics
 
 _SCOPE = {"math": math, **vars(intrinsics)}
 

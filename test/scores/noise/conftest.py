@@ -10,10 +10,10 @@ import numpy.typing as npt
 import pytest
 from scipy.signal import lfilter
 
-from xb_muscle_ros.replay.made import coloured_noise
 from xb_muscle_ros.scores.noise.model import NoiseModel
 from xb_muscle_ros.scores.noise.trials import by_windows
 from xb_muscle_ros.scores.noise.windows import Window
+from xb_muscle_ros.simulation.made import coloured_noise
 from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
 
 Array = npt.NDArray[np.float64]

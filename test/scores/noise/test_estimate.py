@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from xb_muscle_ros.replay.made import coloured_noise
 from xb_muscle_ros.scores.noise.model import NoiseModel
 from xb_muscle_ros.scores.noise.windows import Window
+from xb_muscle_ros.simulation.made import coloured_noise
 
 Array = npt.NDArray[np.float64]
 Windows = Callable[..., list[Window]]

@@ -29,7 +29,7 @@ from xb_muscle_ros.diagnose.report.phrases import changed, force
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
 from xb_muscle_ros.diagnose.words import joined
-from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
+from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure
 
 _TRIALS, _ROWS = 3, 24
 _TOP_MM, _ROW_MM, _SCATTER_MM = 68.0, 4.3, 70.0

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
-from xb_muscle_ros.figures.style import DATA, MODEL, SECOND
+from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND
 
 Array = npt.NDArray[np.float64]
 Key = tuple[str, str]

@@ -21,7 +21,7 @@ from xb_muscle_ros.diagnose.report.figures.common import (
     wrapped,
 )
 from xb_muscle_ros.diagnose.result import Diagnosis, OfStudyFibre
-from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
+from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure
 
 _FIBRES, _COMPONENTS = 12, 10
 # Columns in which a gain has room beside its standard error.

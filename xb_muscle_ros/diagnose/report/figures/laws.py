@@ -9,7 +9,7 @@ from xb_muscle_ros.diagnose.report.figures.common import WIDTH_MM, Figure, finit
 from xb_muscle_ros.diagnose.report.phrases import share
 from xb_muscle_ros.diagnose.result import Diagnosis, Law
 from xb_muscle_ros.diagnose.words import quantity
-from xb_muscle_ros.figures.style import MODEL, SECOND, figure
+from xb_muscle_ros.plotting.style import MODEL, SECOND, figure
 
 _SCALES = ("constant", "calcium", "activation", "force")
 

@@ -25,7 +25,7 @@ from xb_muscle_ros.diagnose.report.figures.common import (
 )
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
-from xb_muscle_ros.figures.style import MODEL, SECOND, figure
+from xb_muscle_ros.plotting.style import MODEL, SECOND, figure
 
 _TRIALS, _PARTS = 3, 6
 _LENGTH_MM, _FORCE_MM, _PART_MM, _RESIDUAL_MM = 9.0, 34.0, 13.5, 17.0

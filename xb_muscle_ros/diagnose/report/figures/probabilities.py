@@ -11,7 +11,7 @@ from xb_muscle_ros.diagnose.component import NAMED, SURE, Component, HeldOutGain
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.figures.common import WIDTH_MM, Figure, finite, quiet_rows, shown_of, svg, wrapped
 from xb_muscle_ros.diagnose.result import Diagnosis
-from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure
+from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure
 
 _MOST, _ROW_MM = 14, 6.4
 _PERCENT = (-200, -100, -50, -20, -10, -5, -2, -1, 0, 1, 2, 5, 10, 20, 30, 40, 50, 60, 70, 80, 90)

@@ -24,7 +24,7 @@ from xb_muscle_ros.diagnose.report.figures.common import (
 from xb_muscle_ros.diagnose.report.phrases import ONE_WAY, changed
 from xb_muscle_ros.diagnose.result import Diagnosis
 from xb_muscle_ros.diagnose.words import phase_words
-from xb_muscle_ros.figures.style import figure
+from xb_muscle_ros.plotting.style import figure
 
 _TRIALS, _PHASES = 36, 8
 _ROW_MM = 5.2

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
 from typing import NamedTuple
 
-from xb_muscle_ros.evaluate.sets import ORDER, ModelSet, rank
+from xb_muscle_ros.evaluate.sets import ORDER, rank
 
 MEASURED = "#8a8a8a"
 # Neighbours in complexity differ in lightness; hues after Okabe and Ito.
@@ -38,11 +37,6 @@ def look(model: str) -> Look:
     """Look of a parameter set by its model's place in complexity."""
     place = rank(model)
     return Look(_COLOURS[place], _MARKERS[place], _DASHES[place], model not in ORDER)
-
-
-def label(model: str) -> str:
-    """What all figures call a parameter set: as the paper does, where it has a name for it."""
-    return ModelSet(model, MappingProxyType({}), (), None).title
 
 
 def shade(colour: str, depth: float) -> tuple[float, float, float]:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, SHADE, figure, save
 from xb_muscle_ros.fit.ends import DATA as BY_DATA
 from xb_muscle_ros.fit.ends import PRIOR
+from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, SHADE, figure, save
 
 _COLUMNS = 4
 _PANEL_MM = (42.0, 40.0)

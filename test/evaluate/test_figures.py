@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from xb_muscle_ros.evaluate.figures import force as force_figure
+from xb_muscle_ros.evaluate.figures import srs, surfaces
 from xb_muscle_ros.evaluate.sections import srs_section
 from xb_muscle_ros.evaluate.sets import gather
 from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable
-from xb_muscle_ros.figures import evaluate_force, evaluate_srs, evaluate_surfaces, replay_figure
-from xb_muscle_ros.figures.evaluate_look import label
+from xb_muscle_ros.models.titles import title_of
+from xb_muscle_ros.replay import figure as replay_figure
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
 
@@ -55,32 +57,32 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         found.append({"ticks": ticks, "legend": words, "titles": titles, "widths": widths, "bars": bars,
                       "heights": [axis.get_ylim() for axis in figure.axes]})  # fmt: skip
 
-    for module in (evaluate_srs, evaluate_force, evaluate_surfaces, replay_figure):
+    for module in (srs, force_figure, surfaces, replay_figure):
         monkeypatch.setattr(module, "save", look)
     return found
 
 
 def test_a_model_has_one_name_in_all_figures(seen: list[Any], tmp_path: Path) -> None:
     names = {"2-state XB", "3-state XB coop", "3-state XB coop v3"}
-    assert {label(name) for name in MODELS} == names
+    assert {title_of(name) for name in MODELS} == names
     data, tables, section = made((0.001, 0.1), (0.0, 0.0383))
-    assert evaluate_srs.draw_srs(tmp_path / "srs.png", data, tables, section)
+    assert srs.draw_srs(tmp_path / "srs.png", data, tables, section)
     assert names <= seen[0]["legend"]
     assert names <= seen[0]["ticks"]
     held = {"mean": 0.1, "sd": None, "fibres": {"a": 0.1}, "trials": 1}
     overall = {name: {"whole": held, "conditioning": None, "test": held} for name in MODELS}
     force = {"overall": overall, "slices": {}, "paired_t_tests": {"comparisons": []}}
-    evaluate_force.draw_force(tmp_path / "force.png", force)
+    force_figure.draw_force(tmp_path / "force.png", force)
     assert names <= seen[1]["ticks"]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert evaluate_surfaces.draw_surfaces(tmp_path / "one.png", data, {"2state": tables["2state"]}) == ["2state"]
+        assert surfaces.draw_surfaces(tmp_path / "one.png", data, {"2state": tables["2state"]}) == ["2state"]
     assert "2-state XB" in seen[2]["titles"]
 
 
 def test_measured_fibres_have_their_errors(seen: list[Any], tmp_path: Path) -> None:
     data, tables, section = made((0.001, 0.1), (0.0, 0.0383))
-    evaluate_srs.draw_srs(tmp_path / "srs.png", data, tables, section)
+    srs.draw_srs(tmp_path / "srs.png", data, tables, section)
     # Segments of the error bars of the dots: 15/20 with 10 % and 13 % errors.
     segments = [part for bar in seen[0]["bars"] for lines in bar[2] for part in lines.get_segments() if len(part)]
     reach = [float(np.ptp(np.asarray(part)[:, 1])) for part in segments]
@@ -90,7 +92,7 @@ def test_measured_fibres_have_their_errors(seen: list[Any], tmp_path: Path) -> N
 
 def test_nothing_to_draw_is_not_drawn(seen: list[Any], tmp_path: Path) -> None:
     data, tables, section = made((0.07,), (0.01, 0.03))
-    assert not evaluate_srs.draw_srs(tmp_path / "srs.png", data, tables, section)
+    assert not srs.draw_srs(tmp_path / "srs.png", data, tables, section)
     assert seen == []
 
 
@@ -99,7 +101,7 @@ def test_measured_force_is_a_thin_line(seen: list[Any], tmp_path: Path, count: i
     trial = StretchShortenStretch(0.0383, 0.1).trial("f", 6.1)
     trial = replace(trial, force_time_s=trial.time_s, force_n=np.ones(trial.time_s.size))
     simulated = Simulated(*[trial.time_s] * 4, dict.fromkeys(MOMENTS, trial.time_s))
-    replay_figure.draw_replay(tmp_path / "replay.png", [trial] * count, [simulated] * count, label("2state"))
+    replay_figure.draw_replay(tmp_path / "replay.png", [trial] * count, [simulated] * count, title_of("2state"))
     assert len(seen) == (count + 8) // 9
     assert max(width for page in seen for width in page["widths"]) <= 1.0
 

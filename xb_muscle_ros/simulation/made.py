@@ -8,7 +8,7 @@ import numpy as np
 
 from xb_muscle_ros.measurement.recording import given_calcium, given_length, recorded_force
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.offline import simulate_trial
+from xb_muscle_ros.simulation.offline import simulate_trial
 from xb_muscle_ros.trials.trial import Array, Trial
 
 # Of a real recording at 1 kHz (rat soleus fibre 18Dec2017a): SD 0.03 to 0.14 % F0, lag-1 autocorrelation 0.91 to 0.98.

@@ -10,8 +10,8 @@ import numpy as np
 
 from xb_muscle_ros.evaluate.srs_scores import READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable
-from xb_muscle_ros.figures.evaluate_look import label
-from xb_muscle_ros.figures.style import figure, save
+from xb_muscle_ros.models.titles import title_of
+from xb_muscle_ros.plotting.style import figure, save
 from xb_muscle_ros.scores.activation import CLASSES
 from xb_muscle_ros.scores.conditions import Mask
 from xb_muscle_ros.scores.relative import nanmean
@@ -52,7 +52,7 @@ def draw_surfaces(path: Path, data: SrsTable, tables: Mapping[str, SrsTable]) ->
         axes = [made.add_subplot(rows, columns, k + 1, projection="3d") for k in range(len(shown))]
         for axis, name in zip(axes, shown, strict=True):
             drawn = _panel(axis, data, tables[name])
-            axis.set_title(label(name), fontsize=8, y=1.02)
+            axis.set_title(title_of(name), fontsize=8, y=1.02)
             axis.set_box_aspect((1.0, 1.0, 0.75), zoom=1.05)
         place = made.add_axes((1.0 - 18.0 / width, 0.5 - 28.0 / height, 3.0 / width, 56.0 / height))
         bar = made.colorbar(drawn, cax=place)

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.evaluate.figures.look import MEASURED, look, shade
 from xb_muscle_ros.evaluate.srs_errors import pooled_error
 from xb_muscle_ros.evaluate.srs_scores import READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, place
-from xb_muscle_ros.figures.evaluate_look import MEASURED, label, look, shade
-from xb_muscle_ros.figures.style import figure, save
+from xb_muscle_ros.models.titles import title_of
+from xb_muscle_ros.plotting.style import figure, save
 from xb_muscle_ros.scores.activation import CLASSES, activation_class
 from xb_muscle_ros.scores.conditions import (
     COMMON_AMPLITUDE_L0,
@@ -156,7 +157,7 @@ def _profile(axis: Any, along: str, data: SrsTable, tables: Mapping[str, SrsTabl
         order = np.argsort(x)
         axis.plot(
             x[order], y[order], color=way.colour, linestyle=way.line, linewidth=1.2, marker=way.marker, markersize=3.2,
-            markerfacecolor="white" if way.hollow else way.colour, label=label(name), zorder=3,
+            markerfacecolor="white" if way.hollow else way.colour, label=title_of(name), zorder=3,
         )  # fmt: skip
     axis.set_ylim(0.0, _TOP)
     tested = np.concatenate(every)
@@ -205,7 +206,7 @@ def _bars(axis: Any, which: str, section: Mapping[str, Any]) -> None:
                     k + side, value, 0.36, color=fill if reading == "released" else "white", edgecolor=way.colour,
                     linewidth=1.0, hatch="////" if way.hollow else None,
                 )  # fmt: skip
-    axis.set_xticks(range(len(models)), [label(name) for name in models], rotation=35, ha="right")
+    axis.set_xticks(range(len(models)), [title_of(name) for name in models], rotation=35, ha="right")
     axis.set_xlim(-0.6, len(models) - 0.4)
     if all(of[reading]["rmsd"][which] is None for of in section["models"].values() for reading in _SIDES):
         axis.text(0.5, 0.5, "not tested", transform=axis.transAxes, ha="center", va="center")

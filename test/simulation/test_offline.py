@@ -12,9 +12,9 @@ import pytest
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.offline import calcium_per_step, simulate_trial
 from xb_muscle_ros.replay.report import add_relative_stiffness, record, table
 from xb_muscle_ros.replay.run import replay, write_results
+from xb_muscle_ros.simulation.offline import calcium_per_step, simulate_trial
 from xb_muscle_ros.trials.bags import read_simulated, read_trial, write_trial
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.trial import Trial, TrialFacts

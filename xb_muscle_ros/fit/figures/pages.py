@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.figures.fit_profiles import draw_profiles
-from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, figure, save
-from xb_muscle_ros.figures.trial_pages import Look, pages_of, panels, size_mm
+from xb_muscle_ros.fit.figures.profiles import draw_profiles
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.run import Fitted
+from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure, save
+from xb_muscle_ros.plotting.trial_pages import Look, pages_of, panels, size_mm
 
 _PER_PAGE = 12
 _LOOK = Look((3, 1), 0.08, "Force (F$_0$)", "Residual\n(% F$_0$)", row_mm=62.0, extra_mm=14.0)

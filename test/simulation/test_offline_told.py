@@ -11,7 +11,7 @@ import pytest
 from xb_muscle_ros.errors import StateViolation, UserError, naming
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.offline import pushing, simulate_trial
+from xb_muscle_ros.simulation.offline import pushing, simulate_trial
 from xb_muscle_ros.trials.trial import Trial, TrialFacts
 
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, SHADE, figure, save
-from xb_muscle_ros.figures.trial_pages import Look, pages_of, panels, size_mm
+from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, SHADE, figure, save
+from xb_muscle_ros.plotting.trial_pages import Look, pages_of, panels, size_mm
 from xb_muscle_ros.trials.simulated import Simulated
 from xb_muscle_ros.trials.trial import Trial
 

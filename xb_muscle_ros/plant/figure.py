@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.figures.style import DATA, MODEL, SECOND, SHADE, THIRD, figure, save
 from xb_muscle_ros.plant.loop import Trace
 from xb_muscle_ros.plant.report import rows
+from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, SHADE, THIRD, figure, save
 
 _FIRST_S = 0.1
 _LOOKS: tuple[dict[str, Any], ...] = (

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.figures.evaluate_look import label, look, shade
-from xb_muscle_ros.figures.style import figure, save
+from xb_muscle_ros.evaluate.figures.look import look, shade
+from xb_muscle_ros.models.titles import title_of
+from xb_muscle_ros.plotting.style import figure, save
 
 _WINDOWS = {"whole": "Whole protocol", "conditioning": "Conditioning stretch", "test": "Test stretch"}
 _VARIED = {"pca": "pCa", "amplitude_l0": "amplitude", "recovery_s": "recovery time"}
@@ -33,7 +34,7 @@ def draw_force(path: Path, section: Mapping[str, Any]) -> None:
     models = list(section["overall"])
     slices = {name: _thinned(entries) for name, entries in section["slices"].items() if len(entries) > 1}
     # Slanting names reach to the left of the first column and below the last row.
-    longest = max(len(label(name)) for name in models)
+    longest = max(len(title_of(name)) for name in models)
     columns = max(_COLUMN_MM, 26.0 + 4.0 * len(models)) * (1 + len(slices))
     with figure(max(24.0, 1.2 * longest) + columns, 126.0 + 0.9 * longest) as made:
         axes = made.subplots(3, 1 + len(slices), squeeze=False, sharey="row")
@@ -48,7 +49,7 @@ def draw_force(path: Path, section: Mapping[str, Any]) -> None:
             axes[0][column].set_title(f"{'ABCD'[column]}  effect of {_VARIED[varied]}\n", loc="left", fontweight="bold")
             axes[0][column].text(0.0, 1.03, _ends(varied, entries), transform=axes[0][column].transAxes, fontsize=7)
         for axis in axes[-1]:
-            axis.set_xticks(range(len(models)), [label(name) for name in models], rotation=35, ha="right")
+            axis.set_xticks(range(len(models)), [title_of(name) for name in models], rotation=35, ha="right")
         for axis in axes[:-1].flat:
             axis.set_xticks(range(len(models)), [""] * len(models))
         save(made, path)
