@@ -176,6 +176,6 @@ def test_what_was_measured_predicts_itself(real: FeatureTable) -> None:
 
 def test_a_run_down_fibres_stretches_are_no_data(shared_data: Path) -> None:
     found = read_features(shared_data / "empirical_srs.json", {"13Dec2017a": trials_at(4.5, 6.3)})
-    assert found.told[0].startswith("13Dec2017a: features ")
-    assert "21 test stretches at pCa 4.5 are left out" in found.told[0]
+    assert found.told_of_fit[0].startswith("13Dec2017a: features ")
+    assert "21 test stretches at pCa 4.5 are left out" in found.told_of_fit[0]
     assert len(found.cells["13Dec2017a"]) == len(found.features["13Dec2017a"]) + 21

@@ -57,7 +57,10 @@ def test_one_fibre_takes_all_bags_whatever_they_name(make: Make) -> None:
     assert isinstance(study, FibreStudy)
     assert study.fibre.name == B
     assert [trial.facts.fibre for trial in study.trials] == ["somebody", A]
-    assert study.told == ()
+    # A is a fibre of the package, B the one whose file was given.
+    assert study.told == (f"trials of fibres somebody, {A} are diagnosed as those of {B}, the one file given",)
+    (own,) = read_fibres([make(B, 6.1)], [B])
+    assert own.told == ()
 
 
 def test_trials_go_to_the_fibre_they_name_in_the_order_of_recording(make: Make) -> None:

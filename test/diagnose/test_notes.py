@@ -15,6 +15,7 @@ from xb_muscle_ros.diagnose import notes
 from xb_muscle_ros.diagnose.effort import QUICK, Effort
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.fit.coordinates import Coordinate
+from xb_muscle_ros.measurement.faults import FAULTS
 from xb_muscle_ros.scores.noise.model import Source
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.trial import Trial
@@ -37,6 +38,7 @@ def said(
     ]
     system: Any = SimpleNamespace(
         closure_f0={"a": np.array([closure])} if closure else {},
+        error_sd=lambda name: FAULTS[name].sd,
         problem=lambda names, values: SimpleNamespace(coordinates=tuple(coordinates)),
     )
     shown: Any = SimpleNamespace(names=(), values={})
@@ -47,7 +49,8 @@ def said(
 def test_where_all_is_usual_nothing_is_said() -> None:
     assert said() == []
     assert notes.of_search([], []) == []
-    assert notes.of_effort(Effort(), Effort(), 3) == []
+    assert notes.of_effort(Effort(), Effort(), {"a": 3}) == []
+    assert notes.of_order(["a"]) == []
 
 
 STILL = [replace(t, length_m=np.full_like(t.length_m, t.facts.reference_length_m)) for t in TRIALS]
@@ -86,11 +89,24 @@ def test_an_error_beyond_the_usual_is_told_with_its_solution_and_sizes() -> None
 
 
 def test_a_quick_look_and_too_few_trials_are_said() -> None:
-    (quick,) = notes.of_effort(QUICK, Effort(), 3)
+    (quick,) = notes.of_effort(QUICK, Effort(), {"a": 3})
     assert "at most 5 names in a set (else 6)" in quick
     assert "5 groups left out in turn (8), 200 repeats of the bootstrap (500)" in quick
-    assert "nothing could be left out of the fit: there are 2 trials" in notes.of_effort(Effort(), Effort(), 2)[0]
-    assert "there is 1 trial" in notes.of_effort(Effort(), Effort(), 1)[0]
+    assert notes.of_effort(Effort(), Effort(), {"a": 2}) == [
+        "nothing could be left out of the fit: there are 2 trials, at least 3 are needed, so no mechanism is sure"
+    ]
+    assert notes.of_effort(Effort(), Effort(), {"a": 7, "b": 1}) == [
+        "nothing of fibre b could be left out of the fit: there is 1 trial, at least 3 are needed"
+    ]
+
+
+def test_the_order_that_run_down_counts_and_force_that_never_changes_are_said() -> None:
+    assert notes.of_order(["b", "a"]) == ["run-down is counted in the order of the bags: trials b, a"]
+    dead = replace(TRIALS[1], force_time_s=TRIALS[1].time_s, force_n=np.full(TRIALS[1].time_s.size, 0.5))
+    (line,) = said(trials=[TRIALS[0], dead])
+    assert line == (
+        f"force is the same in every sample of trial {dead.facts.trial} though length moves: check the force channel"
+    )
 
 
 def test_what_could_not_be_tried_is_said_and_long_lists_are_cut() -> None:

@@ -25,6 +25,7 @@ def add(subparsers: Subparsers) -> None:
         "--fibre",
         dest="fiber",
         required=True,
+        action="extend",
         nargs="+",
         metavar="FIBER",
         help="fibre files, or names of fibres in the package; with several, bags are found by the fibre's name",
@@ -43,6 +44,7 @@ def add(subparsers: Subparsers) -> None:
     )
     parser.add_argument(
         "--nuisance",
+        action="extend",
         nargs="+",
         default=[],
         metavar="FAULT=SD",
@@ -50,10 +52,16 @@ def add(subparsers: Subparsers) -> None:
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for report and results")
     parser.add_argument("--quick", action="store_true", help="look less hard: minutes become tens of seconds")
-    parser.add_argument("--seed", type=int, default=1, help="of the bootstrap (default 1)")
+    parser.add_argument("--seed", type=_seed, default=1, help="of the bootstrap (default 1)")
     add_overwrite(parser)
     add_work(parser)
     parser.set_defaults(run=run)
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"seed '{text}'; allowed is a whole number from 0 on")
+    return int(text)
 
 
 def run(arguments: argparse.Namespace) -> int:

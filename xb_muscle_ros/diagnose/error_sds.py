@@ -7,6 +7,9 @@ from collections.abc import Mapping, Sequence
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
 
+# An SD this share of the usual one is as good as none.
+_LEAST = 1e-3
+
 
 def error_sds_of(given: Sequence[str]) -> dict[str, float]:
     """Of arguments ``FAULT=SD``, by name of the fault.
@@ -22,7 +25,10 @@ def error_sds_of(given: Sequence[str]) -> dict[str, float]:
         try:
             found[name] = float(value)
         except ValueError:
-            raise UserError(f"--nuisance {text}: give FAULT=SD, such as time_shift=0.002") from None
+            raise UserError(
+                f"--nuisance {text}: SD '{value}' is no number; give FAULT=SD without a unit, such as time_shift=0.002 "
+                "(s)"
+            ) from None
     told_of(found)
     return found
 
@@ -35,14 +41,20 @@ def told_of(error_sds: Mapping[str, float]) -> list[str]:
     """
     lines = []
     for name, sd in error_sds.items():
+        if name in FAULTS and name not in ORDINARY:
+            raise UserError(
+                f"--nuisance: '{name}' is a candidate of every diagnosis and no ordinary error; SDs are of "
+                f"{', '.join(ORDINARY)}"
+            )
         if name not in ORDINARY:
-            hint = suggest(name, ORDINARY)
-            raise UserError(f"ordinary measurement error '{name}' is not known{hint}; there are {', '.join(ORDINARY)}")
+            raise UserError(f"--nuisance: ordinary measurement error '{name}' is not known{suggest(name, ORDINARY)}")
         row = FAULTS[name]
         unit = "" if row.unit == "1" else f" {row.unit}"
-        if not 0.0 < sd <= row.upper:
+        least = _LEAST * row.sd
+        if not least <= sd <= row.upper:
             raise UserError(
-                f"ordinary measurement error '{name}': SD {sd:g}{unit}; allowed is above 0 up to {row.upper:g}{unit}"
+                f"--nuisance: ordinary measurement error '{name}': SD {sd:g}{unit}; allowed is {least:g} to "
+                f"{row.upper:g}{unit}; usual is {row.sd:g}{unit}"
             )
         lines.append(
             f"ordinary measurement error '{name}' has SD {sd:g}{unit}, as was asked (usually {row.sd:g}{unit})"

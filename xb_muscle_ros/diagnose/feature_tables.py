@@ -17,6 +17,8 @@ from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0
 from xb_muscle_ros.trials.trial import Trial
 
 _SAME_PCA = 0.02
+# Noise and a zero that was set a little wrong may take isometric force this far below nothing, F0.
+_LEAST_FORCE_F0 = -0.1
 # Conditions of a table are nominal, those of trials as `nominal` has them.
 _SAME_AMPLITUDE_L0, _SAME_RECOVERY = 1e-6, 1e-6
 
@@ -31,7 +33,8 @@ class FeatureTable:
         features: of each fibre that the file has, in the order of the study; what a fit takes as data. Test stretches
             of a solution in which the fibre had run down are left out.
         cells: of each of these fibres, every cell that was measured, those of run-down fibres as well.
-        told: lines on fibres without features, on what is left out, and on solutions that no trace was recorded in.
+        told: lines on fibres without features, and on solutions that no trace was recorded in.
+        told_of_fit: lines on what a fit leaves out.
     """
 
     path: Path
@@ -39,6 +42,7 @@ class FeatureTable:
     features: Mapping[str, tuple[Feature, ...]]
     cells: Mapping[str, tuple[Feature, ...]]
     told: tuple[str, ...]
+    told_of_fit: tuple[str, ...] = ()
 
 
 def read_features(path: str | Path, trials: Mapping[str, Sequence[Trial]]) -> FeatureTable:
@@ -64,14 +68,27 @@ def read_features(path: str | Path, trials: Mapping[str, Sequence[Trial]]) -> Fe
     missing = [name for name in trials if name not in names]
     if missing:
         told.append(f"features {path} have nothing of fibre{'s'[: len(missing) - 1]} {', '.join(missing)}")
-    features = {}
+    features, told_of_fit = {}, []
     for name in names:
         lines: list[str] = []
         features[name] = measured(path, name, tell=lines.append)
-        told += [f"{name}: {line}" for line in lines]
+        told_of_fit += [f"{name}: {line}" for line in lines]
+        _check_force(path, name, data)
     cells = {name: measured_cells(data, name) for name in names}
     _check_solutions(path, features, trials, told)
-    return FeatureTable(path, data, MappingProxyType(features), MappingProxyType(cells), tuple(told))
+    return FeatureTable(
+        path, data, MappingProxyType(features), MappingProxyType(cells), tuple(told), tuple(told_of_fit)
+    )
+
+
+def _check_force(path: Path, fibre: str, data: SrsTable) -> None:
+    """A fibre does not push: isometric force below nothing is of another unit or sign."""
+    for pca, force in zip(data.pca.tolist(), data.isometric_f0(fibre).tolist(), strict=True):
+        if force < _LEAST_FORCE_F0:
+            raise UserError(
+                f"features {path}, fibre {fibre}: isometric force at pCa {pca:g} is {force:g} F0; allowed is "
+                f"{_LEAST_FORCE_F0:g} F0 and above; check sign and unit"
+            )
 
 
 def _check_solutions(

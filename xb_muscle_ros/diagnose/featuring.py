@@ -25,14 +25,20 @@ _KINDS = {
 }
 
 
-def with_features(d: Diagnosis, study: Searched, table: FeatureTable) -> Diagnosis:
-    """The record with what base and answer predict of a table's cells.
+def with_features(d: Diagnosis, study: Searched, table: FeatureTable, fitted: bool) -> Diagnosis:
+    """The record with what base and answer make of a table's cells.
 
-    Relative SRS is scored at the conditions of which no trace of the study has the stretch.
+    Relative SRS of a table that no fit has met is scored at the conditions of which no trace has the stretch.
+
+    Args:
+        d: without them.
+        study: fits of base and answer.
+        table: measured.
+        fitted: whether the fits had to meet it; its test stretches of run-down fibres are predicted all the same.
     """
     rows: list[Feature] = []
     values: dict[str, dict[str, Array]] = {"before": {}, "after": {}}
-    lines = list(table.told)
+    lines = list(table.told_of_fit if fitted else ()) + list(table.told)
     for i, fibre in enumerate(study.fibres):
         cells = table.cells.get(fibre.name)
         if cells is None:
@@ -51,12 +57,25 @@ def with_features(d: Diagnosis, study: Searched, table: FeatureTable) -> Diagnos
                 measured=float(cell.value),
                 before=float(before),
                 after=float(after),
-                used=seen(cell, study.studies[i].trials),
+                used=fitted and any(_is(cell, f) for f in table.features[fibre.name]),
+                traced=seen(cell, study.studies[i].trials),
             )
             for cell, before, after in zip(cells, *both, strict=True)
         ]
-    found = _scores(study, table, values)
-    return replace(d, features=tuple(rows), feature_scores=found, notes=(*d.notes, *lines))
+    found = () if fitted else _scores(study, table, values)
+    return replace(
+        d,
+        features=(*d.features, *rows),
+        feature_scores=(*d.feature_scores, *found),
+        notes=(*d.notes, *lines),
+    )
+
+
+def _is(cell: Cell, other: Cell) -> bool:
+    """Whether two cells are of one condition."""
+    return (cell.kind, cell.pca, cell.recovery_s, cell.amplitude_l0) == (
+        other.kind, other.pca, other.recovery_s, other.amplitude_l0,
+    )  # fmt: skip
 
 
 def _of_set(study: Searched, names: Names, i: int, cells: tuple[Cell, ...]) -> Array:

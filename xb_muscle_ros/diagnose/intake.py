@@ -70,7 +70,7 @@ def read_fibres(
     known = known or Known()
     if len(fibres) == 1:
         study = read_study(bags, fibres[0].name, known.of_file(fibres[0]), only)
-        return (_checked(FibreStudy(fibres[0], tuple(study.trials), tuple(study.notes))),)
+        return (_checked(FibreStudy(fibres[0], tuple(study.trials), (*study.notes, *_others(bags, fibres[0].name)))),)
     if only is not None:
         raise UserError(
             f"--trials-of {only} takes the trials of one fibre, but there are {len(fibres)} fibre files; with several, "
@@ -119,6 +119,16 @@ def _by_name(bags: Sequence[str | Path], fibres: Sequence[Fibre], known: Known) 
         notes = counted(told for _, told in read)
         found.append(FibreStudy(fibre, tuple(trial for trial, _ in read), tuple(notes)))
     return found
+
+
+def _others(bags: Sequence[str | Path], fibre: str) -> list[str]:
+    """A line on trials of other fibres, which the one fibre file that was given serves."""
+    opened = [TrialBag(path) for path in find_bags(bags)]
+    named = [next(iter(_fibres_of(bag))) for bag in opened if len(bag.fibres) == 1]
+    others = list(dict.fromkeys(name for name in named if name != fibre))
+    if not others:
+        return []
+    return [f"trials of fibre{_s(others)} {', '.join(others)} are diagnosed as those of {fibre}, the one file given"]
 
 
 def _fibres_of(bag: TrialBag) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -27,8 +27,8 @@ _MOVES = 1e-6
 _MOST_NAMES = 6
 
 
-def of_effort(effort: Effort, usual: Effort, trials: int) -> list[str]:
-    """Lines on how hard was looked, and what could not be held out."""
+def of_effort(effort: Effort, usual: Effort, trials: Mapping[str, int]) -> list[str]:
+    """Lines on how hard was looked, and what could not be held out, from the number of trials of each fibre."""
     lines = []
     if effort != usual:
         lines.append(
@@ -36,10 +36,12 @@ def of_effort(effort: Effort, usual: Effort, trials: int) -> list[str]:
             f"{effort.search.candidates} candidates fitted at each step ({usual.search.candidates}), {effort.folds} "
             f"groups left out in turn ({usual.folds}), {effort.draws} repeats of the bootstrap ({usual.draws})"
         )
-    if trials < 3:
+    few = {name: count for name, count in trials.items() if count < 3}
+    for name, count in few.items():
+        of = f" of fibre {name}" if len(trials) > 1 else ""
         lines.append(
-            f"nothing could be left out of the fit: there {'is 1 trial' if trials == 1 else f'are {trials} trials'}, "
-            "at least 3 are needed, so no mechanism is sure"
+            f"nothing{of} could be left out of the fit: there {'is 1 trial' if count == 1 else f'are {count} trials'}, "
+            f"at least 3 are needed{', so no mechanism is sure' if len(few) == len(trials) else ''}"
         )
     return lines
 
@@ -60,7 +62,7 @@ def of_fibre(given: Fibre, trials: Sequence[Trial], recordings: Recordings, syst
         *_noise(recordings),
         *_closure(system),
         *_bounds(coordinates),
-        *_edges(coordinates),
+        *_edges(coordinates, system),
     ]
 
 
@@ -73,12 +75,18 @@ def of_folds(trials: Sequence[FitTrial], folds: Sequence[Collection[str]]) -> li
     return [f"{_named(kept)} stayed in every fit: {SATURATING} defines F0, so nothing is predicted there"]
 
 
+def of_order(names: Sequence[str]) -> list[str]:
+    """A line on the order in which run-down counts trials."""
+    return [f"run-down is counted in the order of the bags: {_named(names)}"] if len(names) > 1 else []
+
+
 def of_search(unsolved: Sequence[Names], left_out: Sequence[str]) -> list[str]:
     """Lines on what could not be tried."""
     lines = []
     if unsolved:
-        named = "; ".join(label(names) for names in unsolved[:_MOST_NAMES])
-        more = f" and {len(unsolved) - _MOST_NAMES} more" if len(unsolved) > _MOST_NAMES else ""
+        once = list(dict.fromkeys(label(names) for names in unsolved))
+        named = "; ".join(once[:_MOST_NAMES])
+        more = f" and {len(once) - _MOST_NAMES} more" if len(once) > _MOST_NAMES else ""
         lines.append(f"sets for which the model had no solution, not tried further: {named}{more}")
     if left_out:
         lines.append(f"mechanisms that do not go with the base model, or are part of it: {', '.join(left_out)}")
@@ -97,6 +105,9 @@ def _inputs(given: Fibre, trials: Sequence[Trial]) -> Iterator[str]:
         yield "length never moves in these trials: what length does to force cannot be seen in them"
     elif still:
         yield f"length never moves in {_named(still)}"
+    dead = [t.facts.trial for t in trials if t.facts.trial not in still and t.force_n.size and np.ptp(t.force_n) == 0.0]
+    if dead:
+        yield f"force is the same in every sample of {_named(dead)} though length moves: check the force channel"
     if len({t.facts.pca for t in trials}) == 1:
         yield "all trials are at one pCa: errors of calcium and of calcium's effects cannot be separated"
     bare = [t.facts.trial for t in trials if not t.facts.phases]
@@ -137,11 +148,11 @@ def _bounds(coordinates: Sequence[Coordinate]) -> Iterator[str]:
         yield f"coordinates that ended at a bound: {', '.join(at)}"
 
 
-def _edges(coordinates: Sequence[Coordinate]) -> Iterator[str]:
+def _edges(coordinates: Sequence[Coordinate], system: System) -> Iterator[str]:
     far = [
-        f"{human(c.name)}{f' of {c.group}' if c.group else ''} {c.start:.3g} (ordinary: {c.prior_sd:.3g})"
+        f"{human(c.name)}{f' of {c.group}' if c.group else ''} {c.start:.3g} (ordinary: {system.error_sd(c.name):.3g})"
         for c in coordinates
-        if c.group is not None and abs(c.start) > _EDGE * c.prior_sd
+        if c.group is not None and abs(c.start) > _EDGE * system.error_sd(c.name)
     ]
     if far:
         yield f"measurement errors beyond {_EDGE:g} of their usual sizes: {', '.join(far)}"

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
-from collections.abc import Mapping
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from xb_muscle_ros.diagnose.report import output
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import Diagnosis
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import matching
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.fibre_writing import write_fibre
@@ -47,12 +51,33 @@ def older_results(out: Path) -> list[Path]:
 
 
 def write(out: Path, d: Diagnosis, made: Files, report: bool = True) -> None:
-    """Write all files of a diagnosis in the place of an older one's; each appears whole or not at all.
+    """Write all files of a diagnosis, and put them in the place of an older one's once all are there.
 
     Raises:
         UserError: the folder cannot be written.
     """
-    remove_results(older_results(out))
+    with _aside(out) as folder:
+        _write(folder, d, made, report)
+        remove_results(older_results(out))
+        for path in sorted(folder.iterdir()):
+            path.rename(out / path.name)
+
+
+@contextlib.contextmanager
+def _aside(out: Path) -> Iterator[Path]:
+    """A folder within another one, gone afterwards with what is left in it."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        folder = Path(tempfile.mkdtemp(prefix=".diagnosis-", dir=out))
+    except OSError as problem:
+        raise UserError(f"{out} cannot be written: {problem.strerror}; choose another name for --out") from problem
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _write(out: Path, d: Diagnosis, made: Files, report: bool) -> None:
     for name, fibre in made.augmented.items():
         write_fibre(
             out / name,

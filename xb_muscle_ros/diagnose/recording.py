@@ -26,6 +26,8 @@ from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.search.whole import beside, only
 from xb_muscle_ros.diagnose.searching import Searched
 from xb_muscle_ros.diagnose.tracing import directed, traced
+from xb_muscle_ros.diagnose.words import percent
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
 
 Array = npt.NDArray[np.float64]
@@ -33,6 +35,8 @@ Array = npt.NDArray[np.float64]
 # More noise than this hides what is looked for, F0; a base that leaves more than this share of the force's standard
 # deviation does not describe the recordings.
 _NOISY_F0, _UNDESCRIBED = 0.02, 0.5
+# A residual follows a law that predicts this share of it where it is left out.
+_LAW = 0.2
 # The fibre file as given is as good as the fitted base within this factor.
 _AS_GOOD = 1.2
 _MOST_SETS = 40
@@ -79,6 +83,7 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
     trials = of_trials(study, chosen, traces)
     if augmented:
         warned += outside.worse_left_out(trials)
+    errorless = [_without_errors(study, chosen, i) for i in range(count)] if augmented else []
     d = Diagnosis(
         format_version=FORMAT,
         fibres=tuple(names),
@@ -110,13 +115,34 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
         augmented={f.name: name for name, f in augmented.items()},
         warnings=tuple(dict.fromkeys(warned)),
         missing=tuple(_missing(study, verdict, found, after)),
-        notes=tuple(_notes(study, chosen, effort)),
+        notes=(*_notes(study, chosen, effort), *errorless),
     )
     protocol = None
     if proposal is not None:
         fibre = study.fibres[0]
         protocol = scaled(proposal.protocol.trial, fibre.reference_length_m, fibre.f0_n)
     return d, Files(augmented, tuple(t.plain for t in traces), protocol)
+
+
+def _without_errors(study: Searched, chosen: Names, i: int) -> str:
+    """A line on what an augmented file does by itself: measurement errors are in the fit, not in the fibre."""
+    recorded, values = study.recorded[i], study.explorer.fits[chosen][i].values
+    problem = recorded.problem(chosen, values)
+    z = np.array(
+        [c.inward(0.0) if c.group is not None else s for c, s in zip(problem.coordinates, problem.start, strict=True)]
+    )
+    name = f"fibre {study.fibres[i].name}"
+    try:
+        forces = problem.predicted(z)
+    except UserError:
+        return f"{name}: the augmented file has no solution without the measurement errors of the fit"
+    left = [f - t.measured_f0 for f, t in zip(forces, recorded.trials, strict=True)]
+    with_errors = _rmsd(study.around(chosen, i).residual_f0)
+    return (
+        f"{name}: a replay of the augmented file leaves {percent(_rmsd(np.concatenate(left)))} % F0, because files "
+        "have no measurement errors (pCa shifts, gain of length, offsets); with those of the fit it is "
+        f"{percent(with_errors)} % F0"
+    )
 
 
 def _rmsd(values: Array) -> float:
@@ -140,7 +166,7 @@ def _law(study: Searched, arounds: Sequence[Around], detected: bool) -> Law | No
     found = [
         law_row(study.fibres[i].name, law)
         for i, around in enumerate(arounds)
-        if (law := study.recordings[i].law(around)) is not None
+        if (law := study.recordings[i].law(around)) is not None and law.explained >= _LAW
     ]
     return max(found, key=lambda row: row.explained, default=None)
 
@@ -206,11 +232,12 @@ def _missing(study: Searched, verdict: Verdict, found: Sequence[Component], afte
 
 
 def _notes(study: Searched, chosen: Names, effort: Effort) -> list[str]:
-    lines = list(notes.of_effort(effort, Effort(), min(len(s.trials) for s in study.studies)))
+    lines = list(notes.of_effort(effort, Effort(), {s.fibre.name: len(s.trials) for s in study.studies}))
     several = len(study.fibres) > 1
     for i, each in enumerate(study.studies):
         own = [
             *each.told,
+            *notes.of_order([t.facts.trial for t in each.trials]),
             *notes.of_folds(study.recorded[i].trials, study.judged.heldout.folds[i]),
             *notes.of_fibre(
                 each.fibre, each.trials, study.recordings[i], study.explorer.systems[i], study.explorer.fits[chosen][i]

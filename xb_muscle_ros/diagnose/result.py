@@ -218,6 +218,7 @@ class Feature:
         condition: in words: pCa, amplitude, recovery.
         measured, before, after: value, by the base and by the answer.
         used: whether the fit had it; else it was predicted.
+        traced: whether a trace of the study has the stretch or the rest that it was measured in.
     """
 
     fibre: str
@@ -227,6 +228,7 @@ class Feature:
     before: float
     after: float
     used: bool
+    traced: bool = False
 
 
 @dataclass(frozen=True)

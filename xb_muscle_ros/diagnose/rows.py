@@ -29,7 +29,10 @@ def _rmsd(values: Array) -> float:
 
 
 def places(names: Sequence[str], found: Sequence[Significance]) -> tuple[Place, ...]:
-    """Where residuals stand out, the largest first; where only the whole does, its largest cell."""
+    """Where residuals stand out; of one fibre the phase with the largest residual first, of several the largest place.
+
+    Where only the whole does, its largest cell.
+    """
     rows = []
     for name, s in zip(names, found, strict=True):
         pcas = {r.trial: r.pca for r in s.residuals}
@@ -121,7 +124,7 @@ def nuisances(study: Searched, chosen: Names) -> tuple[Nuisance, ...]:
                 rows.append(
                     Nuisance(
                         fibre=study.fibres[i].name, name=c.name, group=c.group, unit=FAULTS[c.name].unit,
-                        value=fit.values[c.label], sd=fit.sds[c.label], prior_sd=c.prior_sd,
+                        value=fit.values[c.label], sd=fit.sds[c.label], prior_sd=system.error_sd(c.name),
                         before=base.values.get(c.label),
                     )
                 )  # fmt: skip

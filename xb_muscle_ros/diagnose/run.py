@@ -100,8 +100,7 @@ def diagnose(
     study = searched(studies, effort, seed, options, {} if data is None else data.features, error_sds)
     found, made = recorded(study, effort, seed)
     found = replace(found, notes=(*found.notes, *told))
-    if data is not None:
-        found = replace(found, notes=(*found.notes, *data.told))
-    if table is not None:
-        found = with_features(found, study, table)
+    for given, fitted in ((data, True), (table, False)):
+        if given is not None:
+            found = with_features(found, study, given, fitted)
     return replace(found, seconds=time.monotonic() - begun), made

@@ -146,7 +146,7 @@ def family_of(name: str) -> str | None:
 
 def phase_words(phase: str) -> str:
     """A phase as figures and sentences call it."""
-    return phase.replace("_", " ")
+    return "isometric phase" if phase == "isometric" else phase.replace("_", " ")
 
 
 def joined(items: Sequence[str], last: str = "and") -> str:

@@ -150,7 +150,7 @@ def test_numbers_of_the_record_stand_on_the_page() -> None:
                  "not separable from weakly bound heads", "lowers force late in fast stretch",
                  "Less than 0.05: lattice spacing (0.03), phosphate (< 0.01), transducer lag (< 0.01).",
                  "SRS (F0/L0) pCa 6.2, 3.8 % L0, 316 ms 31.2 38.4 32.9 predicted",
-                 "isometric force (F0) pCa 6.2 0.410 0.440 0.420 in the fit",
+                 "isometric force (F0) pCa 6.2 0.410 0.440 0.420 fitted",
                  "forcible detachment + viscous drag + force drift 0.52", "f 95.0 103 1/s", "augmented/18Dec2017a.yaml",
                  "time constant of 11.8 ms, scales with activation"):  # fmt: skip
         assert told in words, told

@@ -203,8 +203,7 @@ def test_unexplained_tells_the_nearest_and_the_law() -> None:
     assert "No mechanism reaches a probability of 0.5; the most probable is weakly bound heads (0.34)." in text
     assert "time constant of 11.8 ms and scales with the activation of the thin filament" in text
     assert headline(d).startswith("Unexplained: 1.")
-    weak = replace(d.remaining, law=replace(d.remaining.law, explained=0.1) if d.remaining.law else None)
-    assert "follows no simple memory" in said(replace(d, remaining=weak))
+    assert "fades after stretch" not in said(replace(d, base_law=None, remaining=replace(d.remaining, law=None)))
 
 
 def test_measurement_alone_asks_to_check_the_recordings() -> None:

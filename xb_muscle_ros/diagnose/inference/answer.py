@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -83,11 +83,12 @@ class Judged:
     def replication(self, group: Sequence[Name], fibre: int) -> float | None:
         """Log Bayes factor: by how much a fibre raises the log-odds that the other fibres alone give a component.
 
-        None where there is no other fibre, or where no set is without the component.
+        None where there is no other fibre, or where no fitted set has the component or none is without it.
         """
         if not self.without_fibres:
             return None
-        told = self.averages.log_odds(group) - self.without_fibres[fibre].log_odds(group)
+        # What was only promised is worth no more than its cap, whatever a fibre says.
+        told = self.averages.fitted_alone.log_odds(group) - self.without_fibres[fibre].fitted_alone.log_odds(group)
         return min(max(told, -MOST_LOG_ODDS), MOST_LOG_ODDS) if math.isfinite(told) else None
 
     @property
@@ -180,13 +181,16 @@ def _of_all(judged: Judged, names: Names, name: Name) -> tuple[Parameter, ...]:
     if len(e.systems) == 1:
         return _of_one(judged, names, name, 0)
     if name in MEASUREMENT:
-        return ()
+        # Each fibre's recordings have errors of their own.
+        own = [(s.fibre.name, p) for i, s in enumerate(e.systems) for p in _of_one(judged, names, name, i)]
+        return tuple(replace(p, name=f"{p.name} of {fibre}") for fibre, p in own)
     rows = []
     estimates = e.estimates(names)
     coordinates = {c.label: c for c in e.systems[0].problem(names, e.fits[names][0].values).coordinates}
     for label in CATALOGUE[name.value].parameters:
         c, d = coordinates[label], distribution(estimates[label])
-        low, high = c.outward(d.mean - _NORMAL * d.se), c.outward(d.mean + _NORMAL * d.se)
+        ends = (d.mean - _NORMAL * d.se, d.mean + _NORMAL * d.se)
+        low, high = (c.outward(max(min(x, c.inward(c.upper)), c.inward(c.lower))) for x in ends)
         # On a logarithmic scale the spread is that around the centre.
         value = c.outward(d.mean)
         spread = value * float(np.expm1(d.spread)) if c.log else d.spread

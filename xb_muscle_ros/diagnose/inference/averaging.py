@@ -46,6 +46,13 @@ class Averaged:
         chances: Array = np.exp(self.log_evidence - np.logaddexp.reduce(self.log_evidence))
         return chances
 
+    @property
+    def fitted_alone(self) -> Averaged:
+        """Without what was only promised."""
+        kept = self.fitted
+        sets = tuple(s for s, k in zip(self.sets, kept, strict=True) if k)
+        return Averaged(sets, self.log_evidence[kept], self.mean_square_f0[kept], self.fitted[kept])
+
     def including(self, names: Collection[Name]) -> float:
         """That one of some names, or several, are part of the truth."""
         wanted = set(names)

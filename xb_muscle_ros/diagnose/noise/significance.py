@@ -102,10 +102,12 @@ class Significance:
     def _phase(self, cell: Cell) -> tuple[str, float]:
         """Name of the phase that a cell is part of, and the residual's root mean square over all of it, F0."""
         r = next(r for r in self.residuals if r.trial == cell.trial)
-        middle = 0.5 * (cell.start_s + cell.end_s)
-        phase = next((p for p in r.phases if p.start_s <= middle <= p.end_s), None)
-        if phase is None:
+        times = r.time_s[(r.time_s >= cell.start_s) & (r.time_s <= cell.end_s)]
+        # That of most of its samples: force may be absent in between.
+        counts = [int(np.count_nonzero((times >= p.start_s) & (times <= p.end_s))) for p in r.phases]
+        if not any(counts):
             return cell.phase, float(self.rms_f0[self.cells.index(cell)])
+        phase = r.phases[int(np.argmax(counts))]
         inside = (r.time_s >= phase.start_s) & (r.time_s <= phase.end_s)
         return phase.name, float(np.sqrt(np.mean(r.value_f0[inside] ** 2)))
 

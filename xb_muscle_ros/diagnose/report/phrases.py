@@ -163,10 +163,21 @@ def solutions(levels: Iterable[float | None]) -> str:
     return f"pCa {known[0]:g}" if len(known) == 1 else f"pCa {known[0]:g} to {known[-1]:g}"
 
 
+def _like_first(places: Sequence[Place]) -> list[Place]:
+    """The largest place with all others of its phase and direction."""
+    return [p for p in places if p.phase == places[0].phase and way(p) == way(places[0])]
+
+
+def largest(places: Sequence[Place]) -> str:
+    """Size of the largest place that `where` speaks of."""
+    rows = _like_first(places)
+    words = "up to " if len({(p.fibre, p.trial) for p in rows}) > 1 else ""
+    return words + force(max(p.size_f0 for p in rows))
+
+
 def where(d: Diagnosis, places: Sequence[Place]) -> str:
     """Phase and conditions of the largest place, with all others of its phase and direction."""
-    first = places[0]
-    rows = [p for p in places if p.phase == first.phase and way(p) == way(first)]
+    first, rows = places[0], _like_first(places)
     trials = list(dict.fromkeys((p.fibre, p.trial) for p in rows))
     total, levels = len(d.trials), solutions(p.pca for p in rows)
     if len(trials) == 1:

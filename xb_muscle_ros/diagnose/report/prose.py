@@ -15,8 +15,8 @@ from xb_muscle_ros.diagnose.words import SCALES, chance, human, joined, quantity
 MOST = 6
 """Sentences of a summary."""
 _MOST_CAUSES, _MOST_CHANGES = 4, 3
-# Parameters that moved less than this share are not worth a word; a law that predicts less than this describes nothing.
-_CHANGED, _LAW = 0.02, 0.2
+# Parameters that moved less than this share are not worth a word.
+_CHANGED = 0.02
 _HIGHER = {1: "higher than", -1: "lower than", 0: "now higher, now lower than"}
 _UNJUDGED = "the model does not describe these recordings, or noise hides what is looked for"
 
@@ -78,25 +78,32 @@ def _noise(d: Diagnosis) -> str:
 
 def _difference(d: Diagnosis) -> str:
     return (
-        f"Fitted with ordinary measurement error, the base model {d.model} differs from the recordings of "
-        f"{say.fibres(d)} by {say.force(d.before.train_rmsd_f0)}{_noise(d)}."
+        f"Fitted with ordinary measurement error{_tabulated(d)}, the base model {d.model} differs from the recordings "
+        f"of {say.fibres(d)} by {say.force(d.before.train_rmsd_f0)}{_noise(d)}."
     )
 
 
 def _followed(d: Diagnosis) -> str:
     return (
-        f"Fitted with ordinary measurement error, the model {d.model} follows the recordings of {say.fibres(d)} to "
-        f"within {say.force(d.before.train_rmsd_f0)}{_noise(d)}."
+        f"Fitted with ordinary measurement error{_tabulated(d)}, the model {d.model} follows the recordings of "
+        f"{say.fibres(d)} to within {say.force(d.before.train_rmsd_f0)}{_noise(d)}."
     )
+
+
+def _tabulated(d: Diagnosis) -> str:
+    """What the fit had to meet beside the traces."""
+    count = sum(f.used for f in d.features)
+    return f" and {count} tabulated features" if count else ""
 
 
 def _where(d: Diagnosis) -> list[str]:
     if not d.mismatch:
         return []
     first = d.mismatch[0]
+    size = say.largest(d.mismatch)
     return [
         f"The difference is largest in the {say.where(d, d.mismatch)}, where measured force is "
-        f"{_HIGHER[say.way(first)]} the model's ({say.force(first.size_f0)} root mean square)."
+        f"{_HIGHER[say.way(first)]} the model's ({size} root mean square)."
     ]
 
 
@@ -182,8 +189,6 @@ def _remains(d: Diagnosis) -> str:
 def _law(law: Law | None) -> list[str]:
     if law is None or not math.isfinite(law.time_constant_s):
         return []
-    if not law.explained >= _LAW:
-        return ["The residual follows no simple memory of stretch."]
     scales = f" and {SCALES[law.scales_with]}" if law.scales_with in SCALES else ""
     constant = quantity(1e3 * law.time_constant_s, "ms")
     return [

@@ -51,11 +51,16 @@ def _table(d: Diagnosis) -> list[str]:
     return [*lines, f"{len(shown)} of {len(d.components)} candidates shown"] if left else lines
 
 
+def _share(c: Component) -> str:
+    """Nothing was taken out where it is not part of the answer."""
+    return say.share(c.share_of_mismatch) if c.inclusion_probability >= NAMED else say.NOTHING
+
+
 def _rows(c: Component) -> list[tuple[str, ...]]:
     """A line for a component, and one for each further line of its name or further parameter."""
     names = _wrapped(say.title(c) + (" (artefact)" if c.kind is Kind.ARTEFACT else ""), _NAME)
     told = [f"{p.name} {say.estimate(p)}{' at bound' if p.at_bound else ''}" for p in c.parameters]
-    first = (say.probability(c.inclusion_probability), say.share(c.share_of_mismatch), say.gain(c.heldout_gain))
+    first = (say.probability(c.inclusion_probability), _share(c), say.gain(c.heldout_gain))
     out: list[tuple[str, ...]] = []
     for k in range(max(len(names), len(told), 1)):
         name, parameter = (names[k] if k < len(names) else ""), (told[k] if k < len(told) else "")
