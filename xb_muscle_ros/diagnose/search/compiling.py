@@ -32,9 +32,10 @@ def compile_first(fibres: Sequence[Fibre], options: Options) -> None:
     wanted: dict[tuple[str, str], Fibre] = {}
     for fibre in fibres:
         frames: list[tuple[Name, ...]] = [(), *((n,) for n in FRAMES if n in beside(fibre))]
-        made = [whole(fibre, frame) for frame in frames]
+        # The one that takes longest first, so that the cores end together.
+        made = [whole(fibre, frame) for frame in reversed(frames)]
         if has_closure(fibre):
-            made.insert(1, by_distribution(fibre))
+            made += [by_distribution(fibre), fibre]
         wanted |= {(f.model, f.method): f for f in made}
     missing = [f for f in wanted.values() if not is_compiled(f.model, f.method, False)]
     if len(missing) < 2 or options.processes == 0 or options.scheduler is not None:
