@@ -14,10 +14,10 @@ from xb_muscle_ros.diagnose.feature_predictions import as_table, predicted, rela
 from xb_muscle_ros.diagnose.feature_tables import FeatureTable, read_features, seen
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.evaluate import grid
-from xb_muscle_ros.evaluate.sets import fibre_to_task
 from xb_muscle_ros.evaluate.srs_scores import READINGS, score
 from xb_muscle_ros.fit.features import Feature
 from xb_muscle_ros.models.fibre_file import load_fibre
+from xb_muscle_ros.models.plain import fibre_to_plain
 from xb_muscle_ros.scores.conditions import CONDITIONS, Condition
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.trial import Trial
@@ -136,7 +136,7 @@ def test_predictions_are_the_grids(real: FeatureTable) -> None:
     recoveries = sorted({f.recovery_s for f in chosen if f.kind == "srs_test"})
     amplitudes = sorted({f.amplitude_l0 for f in chosen if f.kind == "srs_test"})
     task = {
-        "fibre": fibre_to_task(fibre), "pca": 6.25, "recoveries_s": recoveries, "amplitudes_l0": amplitudes,
+        "fibre": fibre_to_plain(fibre), "pca": 6.25, "recoveries_s": recoveries, "amplitudes_l0": amplitudes,
         "settle_s": None,
     }  # fmt: skip
     cells = grid.simulate(task)

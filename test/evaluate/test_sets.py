@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.evaluate.sets import fibre_to_task, gather, muscle_of_task, rank
+from xb_muscle_ros.evaluate.sets import gather, rank
 from xb_muscle_ros.evaluate.srs_scores import aic_reference
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.models.plain import fibre_to_plain, muscle_of_plain
 
 
 def fibre_file(folder: Path, repo_root: Path, name: str, sets: list[str], source: str = "made up") -> Path:
@@ -80,7 +81,7 @@ def test_mistakes_are_named(tmp_path: Path, repo_root: Path) -> None:
 
 def test_a_fibre_goes_through_a_task_whole() -> None:
     fibre = gather(["18Dec2017a"], ["3state_coop"], None)[0].fibres["18Dec2017a"]
-    muscle = muscle_of_task(fibre_to_task(fibre))
+    muscle = muscle_of_plain(fibre_to_plain(fibre))
     direct = Muscle(fibre)
     assert muscle.parameters.tolist() == direct.parameters.tolist()
-    assert muscle_of_task(fibre_to_task(fibre)) is muscle
+    assert muscle_of_plain(fibre_to_plain(fibre)) is muscle

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.errors import UserError, naming
-from xb_muscle_ros.evaluate.sets import ModelSet, fibre_to_task, muscle_of_task
+from xb_muscle_ros.evaluate.sets import ModelSet
 from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable, place
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.models.plain import fibre_to_plain, muscle_of_plain
 from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0
 from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.scores.redevelopment import Redevelopment, redevelopment
@@ -49,7 +50,7 @@ def tasks(
     """
     return [
         {
-            "fibre": fibre_to_task(fibre),
+            "fibre": fibre_to_plain(fibre),
             "pca": pca,
             "recoveries_s": list(recoveries_s),
             "amplitudes_l0": list(amplitudes_l0),
@@ -75,7 +76,7 @@ def simulate(task: Mapping[str, Any]) -> dict[str, Any]:
         UserError, StateViolation: see `Muscle.settle` and `Muscle.step`.
     """
     with naming(f"simulation at pCa {task['pca']:g}"):
-        return _simulated(muscle_of_task(task["fibre"]), task)
+        return _simulated(muscle_of_plain(task["fibre"]), task)
 
 
 def _simulated(muscle: Muscle, task: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import functools
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.catalogue import without_effect_line
 from xb_muscle_ros.models.fibre_file import Fibre, base_set, find_fibre_file, load_fibre
-from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.registry import base_of, compose, model_of_set
 from xb_muscle_ros.models.strain_bins import wide_bins_line
 from xb_muscle_ros.models.titles import title_of
@@ -173,27 +169,3 @@ def _gathered(name: str, files: Mapping[str, tuple[str | Path, tuple[str, ...]]]
     loaded = {fibre: load_fibre(files[fibre][0], name, method) for fibre in files if fibre in having}
     missing = tuple(fibre for fibre in files if fibre not in having)
     return ModelSet(name, MappingProxyType(loaded), missing, borrowed)
-
-
-def fibre_to_task(fibre: Fibre) -> dict[str, Any]:
-    """A fibre as JSON, whole: a worker elsewhere needs no file, and a changed parameter makes another task."""
-    return {
-        "name": fibre.name,
-        "model": fibre.model,
-        "method": fibre.method,
-        "values": dict(fibre.values),
-        "reference_length_m": fibre.reference_length_m,
-        "f0_n": fibre.f0_n,
-    }
-
-
-def muscle_of_task(task: Mapping[str, Any]) -> Muscle:
-    """The fibre of `fibre_to_task`, ready to step; a process keeps the last few."""
-    return _muscle(json.dumps(task, sort_keys=True))
-
-
-@functools.lru_cache(maxsize=64)
-def _muscle(text: str) -> Muscle:
-    held = json.loads(text)
-    held["values"] = MappingProxyType(held["values"])
-    return Muscle(Fibre(**held, source="", path=None, available_models=()))

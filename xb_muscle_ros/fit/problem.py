@@ -20,6 +20,7 @@ from xb_muscle_ros.measurement.faults import FAULTS, Scope
 from xb_muscle_ros.measurement.recording import given_calcium, given_length, recorded_force
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.models.plain import fibre_from_plain, fibre_to_plain
 
 Array = npt.NDArray[np.float64]
 
@@ -134,9 +135,8 @@ class Problem:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, so that a worker elsewhere can have it."""
-        fibre = {**self.fibre.__dict__, "values": dict(self.fibre.values), "path": None, "starts": {}}
         return {
-            "fibre": {**fibre, "available_models": list(self.fibre.available_models)},
+            "fibre": fibre_to_plain(self.fibre),
             "trials": [trial.to_json() for trial in self.trials],
             "coordinates": to_json(self.coordinates),
             "ties": dict(self.ties),
@@ -147,13 +147,8 @@ class Problem:
     @staticmethod
     def from_json(row: Mapping[str, Any]) -> Problem:
         """A problem from plain data."""
-        fibre = row["fibre"]
-        fixed = {
-            "values": MappingProxyType(dict(fibre["values"])),
-            "available_models": tuple(fibre["available_models"]),
-        }
         return Problem(
-            fibre=Fibre(**{**fibre, **fixed}),
+            fibre=fibre_from_plain(row["fibre"]),
             trials=tuple(FitTrial.from_json(trial) for trial in row["trials"]),
             coordinates=from_json(row["coordinates"]),
             ties=row["ties"],
