@@ -74,7 +74,7 @@ def test_left_out_trials_that_the_answer_predicts_worse_are_told() -> None:
     rows = [
         left_out("a", "ramp", 0.03, 0.039),
         left_out("a", "cycle", 0.03, 0.0475),
-        left_out("a", "release", 0.03, float("inf")),
+        left_out("a", "release", 0.03, None),
         left_out("a", "shown", None, None),
         left_out("b", "ramp", 0.03, 0.01),
     ]

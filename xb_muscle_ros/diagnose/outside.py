@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -53,8 +52,9 @@ def worse_left_out(rows: Sequence[OfTrial]) -> list[str]:
     found: dict[str, list[str]] = {}
     for row in rows:
         before, after = row.heldout_before_f0, row.heldout_after_f0
-        if before is not None and after is not None and after > before + _WORSE_F0:
-            told = f"{percent(after)} for {percent(before)} % F0" if math.isfinite(after) else "no solution"
+        # Where the base predicts a trial it was left out: what has no number then has no solution.
+        if before is not None and (after is None or after > before + _WORSE_F0):
+            told = "no solution" if after is None else f"{percent(after)} for {percent(before)} % F0"
             found.setdefault(row.fibre, []).append(f"{row.trial} ({told})")
     return [
         f"fibre {fibre}: the answer predicts {'trial' if len(told) == 1 else 'trials'} {joined(told)} worse than the "

@@ -1,4 +1,4 @@
-"""From state to state through single stretches: what is left of the paper's protocol where its trials share a past."""
+"""From state to state through single stretches, for trials of the paper's protocol that begin alike."""
 
 from __future__ import annotations
 

@@ -106,9 +106,7 @@ def _context(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Any]:
         "most": MOST_ROWS,
         "several": len(d.fibres) > 1,
         "changed": say.changed(d),
-        "replicated": lambda fibre: [
-            c.members[0] for c in d.named if any(r.fibre == fibre and r.replicates for r in c.by_fibre)
-        ],
+        "replicated": lambda fibre: say.replicated_by(d, fibre),
     }
 
 
