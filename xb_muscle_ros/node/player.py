@@ -20,8 +20,8 @@ from xb_muscle_ros.node.configuration import flat
 from xb_muscle_ros.node.inputs import stamp_ns
 from xb_muscle_ros.node.link import Link
 from xb_muscle_ros.node.outputs import room
-from xb_muscle_ros.trials.ros_types import to_ns
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
+from xb_muscle_ros.trials.stamps import to_ns
 from xb_muscle_ros.trials.trial import Trial
 
 # Samples under way at once. Well below the depth of the queues, so that nothing is ever lost.

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from rosbags.serde import SerdeError
 
 from xb_muscle_ros.errors import UserError
@@ -15,9 +14,8 @@ from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bag_contents import BagContents
 from xb_muscle_ros.trials.mcap_records import Message
 from xb_muscle_ros.trials.ros_types import JointState
+from xb_muscle_ros.trials.stamps import Stamps, not_after, to_s
 from xb_muscle_ros.trials.trial import Array
-
-Stamps = npt.NDArray[np.int64]
 
 
 class Samples(NamedTuple):
@@ -113,12 +111,12 @@ class Topics:
     def _rows(self, topic: str, row: Callable[[JointState, int, Stamps], list[float] | None], name: str) -> Samples:
         found = self._kept(self.decoded(topic), row)
         warnings = []
-        if _back(found.stamps) is not None and topic in self.bag.as_filed:
+        if not_after(found.stamps).size and topic in self.bag.as_filed:
             # A recorder's own clock may step back; then the file has the order.
             if topic not in self._as_filed:
                 self._as_filed[topic] = self._decode(topic, self.bag.as_filed[topic])
             filed = self._kept(self._as_filed[topic], row)
-            if _back(filed.stamps) is None:
+            if not not_after(filed.stamps).size:
                 found = filed
                 warnings.append(
                     f"bag {self.bag.path}: {topic} is in the order of the file, because log times step back"
@@ -132,7 +130,7 @@ class Topics:
             raise UserError(f"{where} has the value {values[i, j]}; allowed are finite numbers")
         total = len(found.rows) + found.others
         skipped = f"{found.others} of {total} messages on {topic}" if found.others else ""
-        return Samples(ros_types.to_s(found.stamps), values, name, tuple(warnings), skipped)
+        return Samples(to_s(found.stamps), values, name, tuple(warnings), skipped)
 
     def _kept(self, decoded: Decoded, row: Callable[[JointState, int, Stamps], list[float] | None]) -> _Kept:
         rows, places = [], []
@@ -178,8 +176,7 @@ class Topics:
         return Decoded(np.array(stamps, dtype=np.int64), messages)
 
     def _check_order(self, topic: str, found: _Kept) -> None:
-        i = _back(found.stamps)
-        if i is not None:
+        for i in not_after(found.stamps)[:1].tolist():
             where = self._at(topic, found.places[i], found.stamps[i])
             raise UserError(
                 f"{where} does not come after the one before, t = {found.stamps[i - 1] / 1e9:.9f} s; header stamps "
@@ -195,9 +192,3 @@ class _Kept(NamedTuple):
     rows: list[list[float]]
     places: list[int]
     others: int
-
-
-def _back(stamps: Stamps) -> int | None:
-    """Place of the first stamp that does not come after the one before."""
-    back = np.flatnonzero(np.diff(stamps) <= 0)
-    return int(back[0]) + 1 if back.size else None

@@ -16,6 +16,7 @@ from xb_muscle_ros.trials.bag_files import check_replaceable
 from xb_muscle_ros.trials.bag_writer import BagWriter
 from xb_muscle_ros.trials.custom_data import facts_to_custom_data
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
+from xb_muscle_ros.trials.stamps import not_after, to_ns
 from xb_muscle_ros.trials.trial import Array, Trial
 
 
@@ -106,7 +107,7 @@ def _series(trial: Trial, simulated: Simulated | None, where: str) -> list[_Seri
 
 
 def _one_value(topic: str, time_s: Array, values: Array, names: list[str]) -> Callable[[int], bytes]:
-    stamps = ros_types.to_ns(time_s)
+    stamps = to_ns(time_s)
     if ros_types.VALUE_FIELD[topic] == "effort":
         return lambda i: ros_types.joint_state(int(stamps[i]), names, effort=values[i : i + 1])
     return lambda i: ros_types.joint_state(int(stamps[i]), names, position=values[i : i + 1])
@@ -144,10 +145,8 @@ def _stamps(time_s: Array, columns: tuple[Array, ...], topic: str, where: str) -
             f"bag {where}: {topic} runs from {time_s[0]:.9g} to {time_s[-1]:.9g} s; a message stamp goes from 0 to "
             f"{ros_types.LAST_STAMP_NS // 10**9} s; shift the times"
         )
-    stamps = ros_types.to_ns(time_s)
-    back = np.flatnonzero(np.diff(stamps) <= 0)
-    if back.size:
-        i = int(back[0]) + 1
+    stamps = to_ns(time_s)
+    for i in not_after(stamps)[:1].tolist():
         raise UserError(
             f"bag {where}: {topic}, sample {i} at {time_s[i]:.9f} s does not come after {time_s[i - 1]:.9f} s; "
             "stamps have to increase by at least 1 ns"

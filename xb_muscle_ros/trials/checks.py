@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.stamps import GAP_STEPS, largest_gap
 from xb_muscle_ros.trials.told_facts import check_told_facts
-from xb_muscle_ros.trials.trial import Array, Trial
+from xb_muscle_ros.trials.trial import Trial
 
 # With fewer nothing moves, and nothing can be compared.
 LEAST_SAMPLES = 3
@@ -29,8 +30,8 @@ _RELAXED_F0 = 0.1
 _PCA_APART = 0.05
 # Above this pCa a fibre is relaxed, whatever stands for its calcium.
 _RELAXED_PCA = 8.0
-# A gap is this much longer than the median step, and than this, s.
-_GAP_STEPS, _GAP_S = 5.0, 0.01
+# Shorter gaps than this are none, s.
+_GAP_S = 0.01
 # What length changes by across a gap that can be lived with, L0.
 _ACROSS_L0 = 5e-3
 
@@ -138,10 +139,10 @@ def _check_calcium(trial: Trial, where: str) -> None:
 def _gaps(trial: Trial, where: str) -> tuple[str, ...]:
     lines = []
     for what, time_s in (("length", trial.time_s), ("measured force", trial.force_time_s)):
-        gap = _largest_gap(time_s)
+        gap = largest_gap(time_s, _GAP_S)
         if gap is None:
             continue
-        start_s, end_s, usual_s = gap
+        start_s, end_s, usual_s, _ = gap
         line = (
             f"bag {where}: {what} has no sample for {end_s - start_s:.3g} s after t = {start_s:.6g} s, where samples "
             f"are {usual_s:.3g} s apart"
@@ -160,21 +161,10 @@ def _cover(trial: Trial, where: str) -> tuple[str, ...]:
     force_s, time_s = trial.force_time_s, trial.time_s
     if force_s.size < 2:
         return ()
-    allowed_s = max(_GAP_STEPS * float(np.median(np.diff(force_s))), _GAP_S)
+    allowed_s = max(GAP_STEPS * float(np.median(np.diff(force_s))), _GAP_S)
     if max(force_s[0] - time_s[0], time_s[-1] - force_s[-1]) <= allowed_s:
         return ()
     return (
         f"bag {where}: measured force covers {force_s[0]:.6g} to {force_s[-1]:.6g} s, lengths {time_s[0]:.6g} to "
         f"{time_s[-1]:.6g} s; nothing is compared elsewhere",
     )
-
-
-def _largest_gap(time_s: Array) -> tuple[float, float, float] | None:
-    """Begin and end of the largest gap and the median step, s; None where there is no gap to speak of."""
-    steps = np.diff(time_s)
-    if steps.size < 2:
-        return None
-    usual, i = float(np.median(steps)), int(np.argmax(steps))
-    if steps[i] <= max(_GAP_STEPS * usual, _GAP_S):
-        return None
-    return float(time_s[i]), float(time_s[i + 1]), usual

@@ -12,6 +12,7 @@ from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.provenance import Provenance, provenance_of, recorded_provenance
 from xb_muscle_ros.trials.readers.assembly import trial_of
 from xb_muscle_ros.trials.readers.base import Pending
+from xb_muscle_ros.trials.readers.description import filled
 from xb_muscle_ros.trials.readers.registry import READERS, recording_suffixes
 from xb_muscle_ros.trials.readers.settings import ImportSettings, MappingError, Prepared
 from xb_muscle_ros.trials.trial import Trial
@@ -127,7 +128,7 @@ def _import_file(path: Path, run: _Run) -> Iterator[Event]:
 
 
 def _import_trial(pending: Pending, prepared: Prepared, origin: Provenance, run: _Run) -> Event:
-    bag = run.out / bag_name(prepared.mapping.data_set_of(prepared.path), pending.trial)
+    bag = run.out / bag_name(filled(prepared.mapping.data_set, prepared.path), pending.trial)
     here = f"{prepared.path}, trial {pending.trial}"
     if bag.name in run.done:
         other = run.done[bag.name]

@@ -1,11 +1,10 @@
-"""Topics of a trial bag, their message type and quality of service, and stamps in ns."""
+"""Topics of a trial bag, their message type and their quality of service."""
 
 from __future__ import annotations
 
 import functools
 
 import numpy as np
-import numpy.typing as npt
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
@@ -71,14 +70,3 @@ def joint_state(
     header = std_msgs__msg__Header(stamp=stamp, frame_id="")
     message = JointState(header=header, name=names, position=position, velocity=velocity, effort=effort)
     return bytes(typestore().serialize_cdr(message, JOINT_STATE))
-
-
-def to_ns(time_s: Array) -> npt.NDArray[np.int64]:
-    """Times in s to stamps in ns, nearest; exact for stamps read with `to_s` up to 26 days."""
-    stamps: npt.NDArray[np.int64] = np.rint(np.asarray(time_s, dtype=np.float64) * 1e9).astype(np.int64)
-    return stamps
-
-
-def to_s(stamps_ns: npt.NDArray[np.int64]) -> Array:
-    """Stamps in ns to the nearest times in s."""
-    return stamps_ns / np.float64(1e9)

@@ -11,18 +11,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bag_files import METADATA, is_bag
 from xb_muscle_ros.trials.mcap_records import MAGIC
-from xb_muscle_ros.trials.readers.base import Pending, begin_of
+from xb_muscle_ros.trials.readers.base import Pending, Reader
 from xb_muscle_ros.trials.readers.columns import BAG
-from xb_muscle_ros.trials.readers.description import Column, ImportMapping
+from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled
 from xb_muscle_ros.trials.readers.fields import FieldPath
 from xb_muscle_ros.trials.readers.foreign_bag import SQLITE, ForeignBag, open_foreign, sqlite_parts
 from xb_muscle_ros.trials.readers.recording import Recording, Signal
+from xb_muscle_ros.trials.stamps import not_after, to_s
 from xb_muscle_ros.trials.trial import Array
 
 
@@ -50,11 +50,12 @@ class _Series:
     skipped: int = 0
 
 
-class BagReader:
+class BagReader(Reader):
     """One trial to a bag. Times begin at the first length message; other signals keep their own."""
 
     name = "bag"
-    suffixes: tuple[str, ...] = (".mcap", ".db3")
+    suffixes = (".mcap", ".db3")
+    begins = (MAGIC, SQLITE)
     kind = BAG
     defaults: Mapping[str, Any] = {
         "fibre": "{file}",
@@ -68,45 +69,29 @@ class BagReader:
         """Whether it is a bag's folder, or a file that begins or is called like a bag's."""
         if path.is_dir():
             return (path / METADATA).is_file() or is_bag(path) or bool(sqlite_parts(path))
-        if path.suffix.lower() in self.suffixes:
-            return True
-        begin = begin_of(path, len(SQLITE))
-        return begin.startswith(MAGIC) or begin == SQLITE
+        return super().matches(path)
 
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
         """The one trial of the bag."""
-        yield Pending(mapping.trial_of(path), lambda: _recording(path, mapping))
-
-    def pca(self, path: Path, mapping: ImportMapping) -> float | None:
-        """As the bag's name or the mapping tells."""
-        return mapping.facts_of(path)["pca"]
+        yield Pending(filled(mapping.trial, path), lambda: _recording(path, mapping))
 
 
 def _recording(path: Path, mapping: ImportMapping) -> Recording:
-    columns = {
-        "length": mapping.length,
-        "force": mapping.force,
-        "calcium": mapping.calcium,
-        "stimulation": None if mapping.stimulation is None else mapping.stimulation.column,
-    }
-    wanted = {key: column for key, column in columns.items() if column is not None}
+    wanted = {key: column for key, column in mapping.columns.items() if key != "time"}
     bag, found = _read(path, wanted, mapping.time.name)
     first_ns = int(found["length"].stamps_ns[0])
     signals = {key: _signal(one, first_ns, key) for key, one in found.items()}
     length = signals["length"]
     assert length.times is not None  # every signal of a bag has its own
+    time = Signal(f"{mapping.time.name} stamp of {mapping.length.name}", length.times, length.at)
     begin = datetime.fromtimestamp(first_ns / 1e9, tz=timezone.utc).isoformat(timespec="milliseconds")
     return Recording(
-        where=f"bag {path}",
-        trial=mapping.trial_of(path),
-        time=Signal(f"{mapping.time.name} stamp of {mapping.length.name}", length.times, length.at),
-        length=replace(length, times=None),
-        force=signals.get("force"),
-        calcium=signals.get("calcium"),
-        stimulation=signals.get("stimulation"),
-        facts=mapping.facts_of(path),
-        notes=(f"time 0 is stamp {first_ns} ns ({begin})",),
-        warnings=(*_state(path, bag), *_left_out(path, found, signals)),
+        f"bag {path}",
+        filled(mapping.trial, path),
+        {"time": time, **signals, "length": replace(length, times=None)},
+        mapping.facts_of(path),
+        (f"time 0 is stamp {first_ns} ns ({begin})",),
+        (*_state(path, bag), *_left_out(path, found, signals)),
     )
 
 
@@ -143,7 +128,7 @@ def _left_out(path: Path, found: Mapping[str, _Series], signals: Mapping[str, Si
 
 def _signal(one: _Series, first_ns: int, key: str) -> Signal:
     """A topic from the first length on; what holds until it changes begins with what held then."""
-    times = (np.array(one.stamps_ns, dtype=np.int64) - first_ns) / np.float64(1e9)
+    times = to_s(np.array(one.stamps_ns, dtype=np.int64) - first_ns)
     values: Array = np.array(one.values)
     first = int(np.searchsorted(times, 0.0))
     if key in ("calcium", "stimulation") and first and (first == times.size or times[first] > 0.0):
@@ -209,10 +194,10 @@ def _check(path: Path, one: _Series, stamp: str) -> None:
             f"{where}, {one.path.text}: there is no joint '{one.path.joint}' in any of {one.skipped} messages; joints "
             f"there: {', '.join(one.joints) or 'none'}"
         )
-    stamps: npt.NDArray[np.int64] = np.array(one.stamps_ns, dtype=np.int64)
-    back = np.flatnonzero(np.diff(stamps) <= 0)
+    stamps = np.array(one.stamps_ns, dtype=np.int64)
+    back = not_after(stamps)
     if back.size:
-        i = int(back[0]) + 1
+        i = int(back[0])
         more = f" ({back.size} such in all)" if back.size > 1 else ""
         unset = stamp == "header" and not stamps.any()
         remedy = (

@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.assembly import trial_of
-from xb_muscle_ros.trials.readers.base import Pending, begin_of, by_columns
-from xb_muscle_ros.trials.readers.columns import FILE
-from xb_muscle_ros.trials.readers.description import Column, ImportMapping
+from xb_muscle_ros.trials.readers.base import Pending, Reader, begin_of
+from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled
 from xb_muscle_ros.trials.readers.recording import Recording, Signal
 from xb_muscle_ros.trials.readers.table import Table, read_table
 from xb_muscle_ros.trials.readers.table_trials import Part, check_pca, parts_of
 from xb_muscle_ros.trials.readers.text_file import looks_like_text
 from xb_muscle_ros.trials.trial import Trial
 
-_LOOKED_AT_BYTES = 4096
 
-
-class CsvReader:
+class CsvReader(Reader):
     """Comma, semicolon or tab separated columns below a header line.
 
     A file is one trial, unless a column tells trials apart or time starts anew; their names then have the column's
@@ -32,15 +27,11 @@ class CsvReader:
     """
 
     name = "csv"
-    suffixes: tuple[str, ...] = (".csv", ".tsv")
-    kind = FILE
-    defaults: Mapping[str, Any] = {}
+    suffixes = (".csv", ".tsv")
 
     def matches(self, path: Path) -> bool:
         """Whether the file is called so or holds text."""
-        if path.suffix.lower() in self.suffixes:
-            return True
-        return looks_like_text(begin_of(path, _LOOKED_AT_BYTES))
+        return super().matches(path) or looks_like_text(begin_of(path))
 
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
         """The trials of the table; it is read whole."""
@@ -51,7 +42,7 @@ class CsvReader:
 
     def pca(self, path: Path, mapping: ImportMapping) -> float | None:
         """As the file's name or the mapping tells; None where a column does."""
-        return None if mapping.calcium is not None else mapping.facts_of(path)["pca"]
+        return None if mapping.calcium is not None else super().pca(path, mapping)
 
 
 def read_csv(path: Path, mapping: ImportMapping, isometric_scaling: bool | None = None) -> Trial:
@@ -68,7 +59,7 @@ def read_csv(path: Path, mapping: ImportMapping, isometric_scaling: bool | None 
 
 
 def _name(path: Path, mapping: ImportMapping, part: Part) -> str:
-    return "_".join(text for text in (mapping.trial_of(path), part.name) if text)
+    return "_".join(text for text in (filled(mapping.trial, path), part.name) if text)
 
 
 def _recording(table: Table, mapping: ImportMapping, part: Part, told: tuple[str, ...]) -> Recording:
@@ -84,5 +75,10 @@ def _recording(table: Table, mapping: ImportMapping, part: Part, told: tuple[str
             return Signal(column.name, np.arange(part.rows.size) / mapping.rate_hz, at)
         return Signal(f"column '{column.name}'", table.numbers(column.name)[part.rows], at)
 
-    found = by_columns(where, mapping, signal, _name(table.path, mapping, part), facts)
-    return replace(found, warnings=(*told, *part.told, *check_pca(table, mapping, part, facts["pca"])))
+    return Recording(
+        where,
+        _name(table.path, mapping, part),
+        {key: signal(column) for key, column in mapping.columns.items()},
+        facts,
+        warnings=(*told, *part.told, *check_pca(table, mapping, part, facts["pca"])),
+    )

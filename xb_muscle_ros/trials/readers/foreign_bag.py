@@ -55,7 +55,7 @@ def _is_sqlite(path: Path) -> bool:
         told = path / METADATA
         named = told.is_file() and b"storage_identifier: sqlite3" in told.read_bytes()
         return not any(path.glob("*.mcap")) and (named or any(path.glob("*.db3")))
-    return path.suffix.lower() == ".db3" or begin_of(path, len(SQLITE)) == SQLITE
+    return path.suffix.lower() == ".db3" or begin_of(path).startswith(SQLITE)
 
 
 def sqlite_parts(folder: Path) -> list[Path]:

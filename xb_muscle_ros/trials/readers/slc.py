@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.trials.readers.base import Pending, begin_of, by_columns
-from xb_muscle_ros.trials.readers.columns import FILE
-from xb_muscle_ros.trials.readers.description import Column, ImportMapping, name_of
+from xb_muscle_ros.trials.readers.base import Pending, Reader
+from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled, name_of
 from xb_muscle_ros.trials.readers.recording import Recording, Signal
 from xb_muscle_ros.trials.readers.slc_file import MAGIC, SlcHeader, read_columns, read_header
 from xb_muscle_ros.trials.trial import Array
@@ -27,7 +25,7 @@ _NOTED = {"Species": "", "Muscle": "", "Temperature": " °C", "pH": " pH", "Drug
 _PCA_IN_NAME = re.compile(r"(\d\d)pCa", re.IGNORECASE)
 
 
-class SlcReader:
+class SlcReader(Reader):
     """One trial to a file; the folder is the preparation.
 
     The column ``fl`` is fibre length in m by the header's calibration, from its length at the begin; ``force`` is in
@@ -36,8 +34,8 @@ class SlcReader:
     """
 
     name = "slc"
-    suffixes: tuple[str, ...] = (".slc",)
-    kind = FILE
+    suffixes = (".slc",)
+    begins = (MAGIC,)
     defaults: Mapping[str, Any] = {
         "fibre": "{folder}",
         "trial": "{folder}_{file}",
@@ -49,13 +47,9 @@ class SlcReader:
         "f0": {"isometric_at_pca": 4.5},
     }
 
-    def matches(self, path: Path) -> bool:
-        """Whether the file begins or is called like one of SLControl."""
-        return path.suffix.lower() in self.suffixes or begin_of(path, len(MAGIC)) == MAGIC
-
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
         """The one trial of the file."""
-        yield Pending(mapping.trial_of(path), lambda: _recording(path, mapping))
+        yield Pending(filled(mapping.trial, path), lambda: _recording(path, mapping))
 
     def pca(self, path: Path, mapping: ImportMapping) -> float | None:
         """As the header tells."""
@@ -72,8 +66,14 @@ def _recording(path: Path, mapping: ImportMapping) -> Recording:
             raise UserError(f"{path} has no channel '{column.name}'{suggest(column.name, channels)}")
         return Signal(f"column '{column.name}'", channels[column.name], lambda i: f"line {header.lines + i + 1}")
 
-    found = by_columns(str(path), mapping, signal, mapping.trial_of(path), _facts(header, mapping))
-    return replace(found, notes=_notes(header), warnings=_rate_warning(header, columns["time"]))
+    return Recording(
+        str(path),
+        filled(mapping.trial, path),
+        {key: signal(column) for key, column in mapping.columns.items()},
+        _facts(header, mapping),
+        _notes(header),
+        _rate_warning(header, columns["time"]),
+    )
 
 
 def _calibrated(header: SlcHeader, columns: dict[str, Array]) -> dict[str, Array]:

@@ -67,6 +67,21 @@ KINDS = {
 }
 
 
+def finite(value: object, key: str, where: str) -> float:
+    """A number.
+
+    Raises:
+        UserError: it is none, or not finite.
+    """
+    try:
+        number = float(value)  # type: ignore[arg-type]  # whatever it cannot take is told below
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise UserError(f"{where}: {key} is {value!r}; needed is a finite number")
+    return number
+
+
 def unit_of(text: str, column: str, where: str) -> Unit:
     """The unit named ``text`` for a column of ``time``, ``length``, ``force``, ``calcium`` or ``stimulation``.
 
