@@ -39,9 +39,9 @@ def recorded_force(time_s: Array, force_f0: Array, faults: Mapping[str, float], 
         force = _lagged(time_s, force, lag)
     if shift != 0.0:
         force = np.interp(time_s - shift, time_s, force)
-    left = (1.0 - faults.get("run_down", 0.0)) ** order
+    remaining = (1.0 - faults.get("run_down", 0.0)) ** order
     drift = faults.get("force_drift", 0.0) * (time_s - time_s[0])
-    return np.asarray(left * force + faults.get("force_offset", 0.0) + drift)
+    return np.asarray(remaining * force + faults.get("force_offset", 0.0) + drift)
 
 
 @njit(cache=True)
@@ -52,6 +52,6 @@ def _lagged(time_s: Array, force: Array, lag_s: float) -> Array:
     for k in range(1, force.size):
         dt = time_s[k] - time_s[k - 1]
         slope = (force[k] - force[k - 1]) / dt
-        left = np.exp(-dt / lag_s)
-        out[k] = force[k] - lag_s * slope + (out[k - 1] - force[k - 1] + lag_s * slope) * left
+        decay = np.exp(-dt / lag_s)
+        out[k] = force[k] - lag_s * slope + (out[k - 1] - force[k - 1] + lag_s * slope) * decay
     return out

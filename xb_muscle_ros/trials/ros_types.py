@@ -26,8 +26,6 @@ FORCE = "/muscle/force"
 MOMENTS = "/muscle/moments"
 # Order of messages with equal stamps: a node that steps on each length message has to hold the calcium by then.
 TOPICS = (CALCIUM, LENGTH, MEASURED_FORCE, FORCE, MOMENTS)
-# The field that carries the value of a topic's first joint.
-VALUE_FIELD = {CALCIUM: "position", LENGTH: "position", MEASURED_FORCE: "effort", FORCE: "effort", MOMENTS: "position"}
 
 LAST_STAMP_NS = (2**31 - 1) * 10**9 + 999_999_999  # builtin_interfaces/Time counts seconds in an int32
 _EMPTY: Array = np.empty(0)

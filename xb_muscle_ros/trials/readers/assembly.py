@@ -13,7 +13,7 @@ from xb_muscle_ros.trials.readers.clock import check_gaps, read_clock, times_of
 from xb_muscle_ros.trials.readers.description import ImportMapping, filled
 from xb_muscle_ros.trials.readers.force import read_force
 from xb_muscle_ros.trials.readers.length import Length, read_length
-from xb_muscle_ros.trials.readers.plausibility import SPIKE_F0, f0_doubts, force_doubts, spikes
+from xb_muscle_ros.trials.readers.plausibility import SPIKE_F0, warn_of_f0, warn_of_force, warn_of_spikes
 from xb_muscle_ros.trials.readers.recording import Draft, Recording, Signal
 from xb_muscle_ros.trials.stamps import GAP_STEPS
 from xb_muscle_ros.trials.trial import Array, Trial, TrialFacts
@@ -53,10 +53,10 @@ def trial_of(recording: Recording, mapping: ImportMapping, path: Path, isometric
     force_f0 = force.force_n / force.f0_n
     if signal is not None and signal.times is not None:
         _check_cover(draft, signal, clock.time_s, force_s)
-    force_doubts(draft, force_f0, calcium.pca)
+    warn_of_force(draft, force_f0, calcium.pca)
     if signal is not None:
-        spikes(draft, signal, force_f0, SPIKE_F0, "F0")
-    f0_doubts(draft, force.f0_n, length.reference_m)
+        warn_of_spikes(draft, signal, force_f0, SPIKE_F0, "F0")
+    warn_of_f0(draft, force.f0_n, length.reference_m)
     _check_onset(draft, length)
     amplitude_l0, recovery_s = conditioning(clock.time_s, length.length_m, length.reference_m, length.phases)
     facts = TrialFacts(

@@ -14,13 +14,14 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
+from xb_muscle_ros.trials.bag_contents import BagContents, all_decoded
 from xb_muscle_ros.trials.bag_files import METADATA, is_bag
 from xb_muscle_ros.trials.mcap_records import MAGIC
 from xb_muscle_ros.trials.readers.base import Pending, Reader
 from xb_muscle_ros.trials.readers.columns import BAG
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled
 from xb_muscle_ros.trials.readers.fields import FieldPath
-from xb_muscle_ros.trials.readers.foreign_bag import SQLITE, ForeignBag, open_foreign, sqlite_parts
+from xb_muscle_ros.trials.readers.foreign_bag import SQLITE, open_any, sqlite_parts
 from xb_muscle_ros.trials.readers.recording import Recording, Signal
 from xb_muscle_ros.trials.stamps import not_after, to_s
 from xb_muscle_ros.trials.trial import Array
@@ -95,10 +96,10 @@ def _recording(path: Path, mapping: ImportMapping) -> Recording:
     )
 
 
-def _state(path: Path, bag: ForeignBag) -> Iterator[str]:
+def _state(path: Path, bag: BagContents) -> Iterator[str]:
     """What is wrong with the bag's files."""
     if bag.flaws:
-        yield f"bag {path}: {'; '.join(bag.flaws)}; {sum(bag.counts.values())} messages were read"
+        yield f"bag {path}: {'; '.join(bag.flaws)}; {sum(map(len, bag.messages.values()))} messages were read"
     number = re.fullmatch(r"(.+_)\d+", path.stem)
     if path.is_file() and number is not None:
         others = [f for f in path.parent.glob(f"{number.group(1)}*{path.suffix}") if f != path]
@@ -139,24 +140,23 @@ def _signal(one: _Series, first_ns: int, key: str) -> Signal:
     return Signal(name, values[first:], lambda i: f"message {numbers[i]}", times[first:])
 
 
-def _read(path: Path, wanted: Mapping[str, Column], stamp: str) -> tuple[ForeignBag, dict[str, _Series]]:
+def _read(path: Path, wanted: Mapping[str, Column], stamp: str) -> tuple[BagContents, dict[str, _Series]]:
     """Stamps and values of the wanted signals; stamps increase."""
     found = {key: _Series(column, FieldPath(column.field, f"bag {path}")) for key, column in wanted.items()}
     topics = {column.name for column in wanted.values()}
-    bag = open_foreign(path, topics)
-    if not bag.topics:
+    bag = open_any(path, topics)
+    if not bag.types:
         raise UserError(f"bag {path} is empty: {'; '.join(bag.flaws) or 'it has no topic'}; record it again")
     for topic in sorted(topics):
-        if topic not in bag.topics:
+        if topic not in bag.types:
             raise UserError(
-                f"bag {path} has no topic {topic}; its topics: {', '.join(sorted(bag.topics))}; name the topic in "
+                f"bag {path} has no topic {topic}; its topics: {', '.join(sorted(bag.types))}; name the topic in "
                 "columns of the mapping"
             )
-        if not bag.counts[topic]:
-            flaws = f" ({'; '.join(bag.flaws)})" if bag.flaws else ""
-            raise UserError(f"bag {path} has no message on {topic}{flaws}; record the topic")
+        if topic not in bag.messages:
+            raise UserError(f"bag {path} has no message on {topic}{bag.flaws_text}; record the topic")
     numbers = dict.fromkeys(topics, 0)
-    for topic, log_ns, message in bag.messages:
+    for topic, log_ns, message in all_decoded(bag):
         where = f"bag {path}, {topic}, message {numbers[topic]}"
         for one in found.values():
             if one.column.name == topic:

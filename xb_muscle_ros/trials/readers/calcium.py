@@ -12,7 +12,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.activation import Interval, force_drop, stimulated_intervals
 from xb_muscle_ros.trials.readers.clock import Clock, times_of
 from xb_muscle_ros.trials.readers.description import Activation
-from xb_muscle_ros.trials.readers.plausibility import calcium_doubts
+from xb_muscle_ros.trials.readers.plausibility import warn_of_calcium
 from xb_muscle_ros.trials.readers.recording import Draft, Signal
 from xb_muscle_ros.trials.trial import Array
 
@@ -66,7 +66,7 @@ def _by_column(draft: Draft, signal: Signal, clock: Clock) -> Calcium:
     if np.count_nonzero(changes) == 1 and calcium_um[0] > 0.0:
         pca = float(signal.values[0]) if is_pca else float(6.0 - np.log10(calcium_um[0]))
     time_s = times_of(signal, clock, draft)
-    calcium_doubts(draft, calcium_um)
+    warn_of_calcium(draft, calcium_um)
     if not is_pca and re.match(r"p[ _-]?ca([^a-z0-9]|$)", column.name, re.IGNORECASE):
         draft.warn(f"{signal.name} is read in {column.unit_name} but called pCa; is pCa its unit?")
     count = int(np.count_nonzero(changes)) - 1

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.readers.plausibility import time_doubts
+from xb_muscle_ros.trials.readers.plausibility import warn_of_time_step
 from xb_muscle_ros.trials.readers.recording import Draft, Signal
 from xb_muscle_ros.trials.stamps import largest_gap, not_after, to_ns, to_s
 from xb_muscle_ros.trials.trial import Array
@@ -42,7 +42,7 @@ def read_clock(draft: Draft) -> Clock:
             f"{largest_s:g} s; is {mapping.time.unit_name} its unit?"
         )
     check_gaps(draft, signal, time_s)
-    time_doubts(draft, step_s)
+    warn_of_time_step(draft, step_s)
     shift_s = max(-float(time_s[0]), 0.0)
     if shift_s:
         draft.warn(f"times shifted by {shift_s:.9g} s, because a stamp cannot be negative")

@@ -9,7 +9,7 @@ import numpy as np
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.phases import detect_phases, initial_isometric
 from xb_muscle_ros.trials.readers.description import ImportMapping
-from xb_muscle_ros.trials.readers.plausibility import SPIKE_L0, length_doubts, sarcomere_hint, spikes
+from xb_muscle_ros.trials.readers.plausibility import SPIKE_L0, sarcomere_hint, warn_of_length, warn_of_spikes
 from xb_muscle_ros.trials.readers.recording import Draft
 from xb_muscle_ros.trials.trial import Array, Phase
 
@@ -52,8 +52,8 @@ def read_length(draft: Draft, time_s: Array) -> Length:
         reference_m = float(np.mean(isometric))
     _check(draft, length_m, reference_m)
     draft.notes.append(_note(mapping, f"{reference_m:.6g} m ({how})"))
-    length_doubts(draft, length_m, reference_m)
-    spikes(draft, signal, length_m / reference_m, SPIKE_L0, "L0")
+    warn_of_length(draft, length_m, reference_m)
+    warn_of_spikes(draft, signal, length_m / reference_m, SPIKE_L0, "L0")
     if mapping.length_of != "fibre":
         length_m, reference_m = length_m / reference_m, 1.0
     return Length(length_m, reference_m, phases)

@@ -18,13 +18,13 @@ from xb_muscle_ros.trials.readers.columns import (
     FILE,
     SIGNALS,
     optional_column,
+    read_activation,
     read_column,
     read_stimulation,
     trial_column,
 )
 from xb_muscle_ros.trials.readers.description import FACTS, LENGTHS_OF, ImportMapping
 from xb_muscle_ros.trials.readers.numerals import DECIMALS
-from xb_muscle_ros.trials.readers.stimulus import read_activation
 from xb_muscle_ros.trials.readers.tree import Keys, check_keys
 from xb_muscle_ros.trials.readers.units import finite
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from typing import NamedTuple
 
 POINT, COMMA = "point", "comma"
 DECIMALS = (POINT, COMMA)
@@ -16,31 +15,14 @@ _EITHER = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?P<mark>[ '.,\u00a0\u2009\u202f\u2019])\d{3}(?:(?P=mark)\d{3})*(?:[.,]\d+)?")
 
 
-class Marks(NamedTuple):
-    """Cells that show a decimal mark (line and text of the first of each kind); None where there is none.
-
-    Attributes:
-        comma: one with a comma.
-        point: one with a point.
-        sure: one with a comma that is no mark of thousands.
-    """
-
-    comma: tuple[int, str] | None = None
-    point: tuple[int, str] | None = None
-    sure: tuple[int, str] | None = None
+def with_comma(cells: Iterable[tuple[int, str]], sure: bool = False) -> tuple[int, str] | None:
+    """The first number with a comma, and its line; with `sure`, one whose comma is no mark of thousands."""
+    return next((c for c in cells if _WITH_COMMA.fullmatch(c[1]) and not (sure and _EITHER.fullmatch(c[1]))), None)
 
 
-def marks_of(cells: Iterable[tuple[int, str]]) -> Marks:
-    """Decimal marks in cells, each with its line; other cells than numbers do not count."""
-    found = Marks()
-    for line, text in cells:
-        if "," in text and _WITH_COMMA.fullmatch(text):
-            found = found._replace(comma=found.comma or (line, text))
-            if found.sure is None and not _EITHER.fullmatch(text):
-                found = found._replace(sure=(line, text))
-        elif found.point is None and "." in text and _WITH_POINT.fullmatch(text):
-            found = found._replace(point=(line, text))
-    return found
+def with_point(cells: Iterable[tuple[int, str]]) -> tuple[int, str] | None:
+    """The first number with a decimal point, and its line."""
+    return next((cell for cell in cells if _WITH_POINT.fullmatch(cell[1])), None)
 
 
 def number(text: str, decimal: str = POINT) -> float:

@@ -37,7 +37,7 @@ SPIKE_L0, SPIKE_F0 = 0.05, 1.0
 USUAL_FORCE_F0 = (-0.1, 3.0)
 
 
-def length_doubts(draft: Draft, length_m: Array, reference_m: float) -> None:
+def warn_of_length(draft: Draft, length_m: Array, reference_m: float) -> None:
     """Warn where L0 (m, or the length of a sarcomere) fits another unit or meaning, and where lengths are far off."""
     mapping, unit = draft.mapping, draft.mapping.length.unit_name
     if mapping.length.unit.kind == "length" and mapping.length_of in SARCOMERES_M:
@@ -63,7 +63,7 @@ def sarcomere_hint(reference_m: float) -> str:
     return f"it is that of a sarcomere: give {' or '.join(fits)}, or the right unit" if fits else ""
 
 
-def spikes(draft: Draft, signal: Signal, values: Array, limit: float, unit: str) -> None:
+def warn_of_spikes(draft: Draft, signal: Signal, values: Array, limit: float, unit: str) -> None:
     """Warn where single samples leave both of their neighbours, to the same side, by more than a limit.
 
     Args:
@@ -84,7 +84,7 @@ def spikes(draft: Draft, signal: Signal, values: Array, limit: float, unit: str)
         )
 
 
-def time_doubts(draft: Draft, step_s: float) -> None:
+def warn_of_time_step(draft: Draft, step_s: float) -> None:
     """Warn where samples are so near or far that the unit of time is in doubt."""
     low, high = USUAL_STEP_S
     if step_s < low or (step_s > high and draft.mapping.largest_step_s is None):
@@ -94,7 +94,7 @@ def time_doubts(draft: Draft, step_s: float) -> None:
         )
 
 
-def calcium_doubts(draft: Draft, calcium_um: Array) -> None:
+def warn_of_calcium(draft: Draft, calcium_um: Array) -> None:
     """Warn where a concentration is one that no muscle is in."""
     column, top = draft.mapping.calcium, float(np.max(calcium_um))
     if column is not None and column.unit.kind == "calcium" and top > 0.0 and not _within(top, USUAL_CALCIUM_UM):
@@ -104,7 +104,7 @@ def calcium_doubts(draft: Draft, calcium_um: Array) -> None:
         )
 
 
-def force_doubts(draft: Draft, force_f0: Array, pca: float | None) -> None:
+def warn_of_force(draft: Draft, force_f0: Array, pca: float | None) -> None:
     """Warn where forces are far from F0."""
     if draft.mapping.force is None or force_f0.size == 0:
         return
@@ -116,7 +116,7 @@ def force_doubts(draft: Draft, force_f0: Array, pca: float | None) -> None:
         draft.warn(f"the largest force is {top:.3g} F0 at pCa {pca:g}, which activates muscle; {right}")
 
 
-def f0_doubts(draft: Draft, f0_n: float, reference_m: float) -> None:
+def warn_of_f0(draft: Draft, f0_n: float, reference_m: float) -> None:
     """Warn where F0 fits no stress, or force and length make no muscle: too wide for its length, or too thin."""
     mapping = draft.mapping
     if mapping.f0 is None or mapping.force is None:

@@ -1,23 +1,26 @@
-"""All that an import was told, and the mapping it makes of that for each file."""
+"""The settings of an import, and the mapping they make for each file."""
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.trials.readers.assembly import trial_of
 from xb_muscle_ros.trials.readers.base import Reader
 from xb_muscle_ros.trials.readers.description import ImportMapping, name_of
+from xb_muscle_ros.trials.readers.force import Force, isometric_force
 from xb_muscle_ros.trials.readers.mapping import build_mapping
-from xb_muscle_ros.trials.readers.preparation import isometric_f0
 from xb_muscle_ros.trials.readers.registry import READERS, reader_for
 from xb_muscle_ros.trials.readers.tree import Keys, merged
+from xb_muscle_ros.trials.readers.units import Quantity
 
 # Raised when the same file and mapping would make another trial than before.
 VERSION = 2
@@ -139,3 +142,51 @@ def _cases(told: object, where: str) -> list[tuple[re.Pattern[str], Mapping[str,
             raise UserError(f"{where}: {keys.path} has {nested}; that holds for all files")
         cases.append((files, {key: value for key, value in tree.items() if key != "files"}))
     return cases
+
+
+_SAME_PCA = 1e-6
+
+
+class FoundF0(NamedTuple):
+    """F0, and where it comes from, in words."""
+
+    f0: Quantity
+    note: str
+
+
+def isometric_f0(folder: Path, suffix: str, reader: Reader, mapping: ImportMapping, pca: float) -> FoundF0 | None:
+    """F0 of the preparation whose files a folder holds; None where no file tells it.
+
+    Args:
+        folder: of the preparation.
+        suffix: ending of its files.
+        reader: reads them.
+        mapping: of them; its F0 is not used.
+        pca: of the trial looked for. Where several have it, the largest force counts: a fibre runs down.
+    """
+    assert mapping.force is not None  # the mapping was checked
+    told = replace(mapping, f0=None, f0_at_pca=None)
+    found = [
+        (force, file.name)
+        for file in sorted(folder.iterdir())
+        if file.suffix.lower() == suffix and file.is_file()
+        for force in _forces(file, reader, told, pca)
+    ]
+    force, name = max(found, key=lambda each: each[0], default=(0.0, ""))
+    if force <= 0.0:
+        return None
+    return FoundF0(Quantity(force, mapping.force.unit.kind), f", the initial isometric force at pCa {pca:g} in {name}")
+
+
+def _forces(file: Path, reader: Reader, mapping: ImportMapping, pca: float) -> Iterator[float]:
+    """Initial isometric forces of a file's trials at a pCa, of those that have one and can be read."""
+    with contextlib.suppress(UserError):  # a broken neighbour is told when its turn comes
+        found = reader.pca(file, mapping)
+        if found is not None and abs(found - pca) > _SAME_PCA:
+            return
+        for pending in reader.trials(file, mapping):
+            with contextlib.suppress(UserError):
+                trial = trial_of(pending.read(), mapping, file, isometric_scaling=False)
+                force = isometric_force(Force(trial.force_time_s, trial.force_n), trial.facts.phases)
+                if force is not None and trial.facts.pca is not None and abs(trial.facts.pca - pca) <= _SAME_PCA:
+                    yield force

@@ -1,4 +1,4 @@
-"""ROS2: a two-stage Rosenbrock method of order 2, L-stable, for which any matrix will do in place of the Jacobian.
+"""A two-stage Rosenbrock method of order 2, L-stable, for which any matrix will do in place of the Jacobian.
 
 Verwer, Spee, Blom and Hundsdorfer, A second-order Rosenbrock method applied to photochemical dispersion problems, SIAM
 J. Sci. Comput. 20 (1999) 1456-1480:

@@ -1,9 +1,9 @@
-"""The coefficients of ROS3 against the conditions that define it."""
+"""The coefficients of the Rosenbrock method of order 3 against the conditions that define it."""
 
 import numpy as np
 import pytest
 
-from xb_muscle_ros.stepping import ros3
+from xb_muscle_ros.stepping import rosenbrock3
 
 
 def _filled(rows):
@@ -14,11 +14,11 @@ def _filled(rows):
 
 
 # Back from the form without products: Gamma^-1 = I/gamma - C, alpha = A Gamma, b = M Gamma.
-GAMMAS = np.linalg.inv(np.eye(3) / ros3.GAMMA - _filled(ros3.C))
-ALPHA = _filled(ros3.A) @ GAMMAS
+GAMMAS = np.linalg.inv(np.eye(3) / rosenbrock3.GAMMA - _filled(rosenbrock3.C))
+ALPHA = _filled(rosenbrock3.A) @ GAMMAS
 BETA = ALPHA + GAMMAS
-WEIGHTS = np.array(ros3.M) @ GAMMAS
-EMBEDDED = (np.array(ros3.M) - np.array(ros3.E)) @ GAMMAS
+WEIGHTS = np.array(rosenbrock3.M) @ GAMMAS
+EMBEDDED = (np.array(rosenbrock3.M) - np.array(rosenbrock3.E)) @ GAMMAS
 
 
 def _order_2(b):
@@ -45,7 +45,7 @@ def test_embedded_method_meets_those_of_order_2_and_no_more():
 
 def test_one_condition_of_order_4_is_met():
     strict = BETA - np.diag(np.diag(BETA))
-    assert WEIGHTS @ strict @ ALPHA.sum(1) ** 2 == pytest.approx(1 / 12 - ros3.GAMMA / 3, abs=1e-14)
+    assert WEIGHTS @ strict @ ALPHA.sum(1) ** 2 == pytest.approx(1 / 12 - rosenbrock3.GAMMA / 3, abs=1e-14)
 
 
 def test_nothing_is_left_of_an_infinitely_stiff_component():
