@@ -8,13 +8,13 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.phases import conditioning
+from xb_muscle_ros.trials.readers.base import Draft, Recording, Signal
 from xb_muscle_ros.trials.readers.calcium import PCA_RANGE, read_calcium
 from xb_muscle_ros.trials.readers.clock import check_gaps, read_clock, times_of
 from xb_muscle_ros.trials.readers.description import ImportMapping, filled
 from xb_muscle_ros.trials.readers.force import read_force
 from xb_muscle_ros.trials.readers.length import Length, read_length
 from xb_muscle_ros.trials.readers.plausibility import SPIKE_F0, warn_of_f0, warn_of_force, warn_of_spikes
-from xb_muscle_ros.trials.readers.recording import Draft, Recording, Signal
 from xb_muscle_ros.trials.stamps import GAP_STEPS
 from xb_muscle_ros.trials.trial import Array, Trial, TrialFacts
 

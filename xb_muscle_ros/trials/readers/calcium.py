@@ -10,10 +10,10 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.activation import Interval, force_drop, stimulated_intervals
+from xb_muscle_ros.trials.readers.base import Draft, Signal
 from xb_muscle_ros.trials.readers.clock import Clock, times_of
 from xb_muscle_ros.trials.readers.description import Activation
 from xb_muscle_ros.trials.readers.plausibility import warn_of_calcium
-from xb_muscle_ros.trials.readers.recording import Draft, Signal
 from xb_muscle_ros.trials.trial import Array
 
 # Beyond these it is no free calcium, or its unit is wrong.

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.readers.base import Draft, Signal
 from xb_muscle_ros.trials.readers.plausibility import warn_of_time_step
-from xb_muscle_ros.trials.readers.recording import Draft, Signal
 from xb_muscle_ros.trials.stamps import largest_gap, not_after, to_ns, to_s
 from xb_muscle_ros.trials.trial import Array
 

@@ -14,11 +14,9 @@ import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.assembly import trial_of
-from xb_muscle_ros.trials.readers.base import Pending, Reader, begin_of
+from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal, begin_of
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled
-from xb_muscle_ros.trials.readers.numerals import number
-from xb_muscle_ros.trials.readers.recording import Recording, Signal
-from xb_muscle_ros.trials.readers.table import Table, looks_like_text, read_table
+from xb_muscle_ros.trials.readers.table import Table, looks_like_text, number, read_table
 from xb_muscle_ros.trials.trial import Trial
 
 

@@ -67,7 +67,7 @@ class ImportMapping:
         activation: makes calcium of stimulation.
         trial: name of the trial, with ``{file}`` and ``{folder}`` as in ``fibre``.
         trial_column: a column of a table whose value tells its trials apart; None for one called so, if any.
-        decimal: decimal mark of a table, `numerals.POINT` or `numerals.COMMA`; None for what its cells show.
+        decimal: decimal mark of a table, `table.POINT` or `table.COMMA`; None for what its cells show.
         rate_hz: samples in a second, where there is no column of time.
         length_is_change: the length column holds the change from the reference length.
         length_of: what the length column is the length of, one of `LENGTHS_OF`; lengths of sarcomeres and halves of

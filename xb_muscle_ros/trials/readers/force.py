@@ -13,8 +13,8 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.phases import initial_isometric
+from xb_muscle_ros.trials.readers.base import Draft
 from xb_muscle_ros.trials.readers.description import ImportMapping
-from xb_muscle_ros.trials.readers.recording import Draft
 from xb_muscle_ros.trials.trial import Array, Phase
 
 # Beyond these it is no muscle's force, or its unit is wrong.

@@ -8,9 +8,9 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.phases import detect_phases, initial_isometric
+from xb_muscle_ros.trials.readers.base import Draft
 from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.readers.plausibility import SPIKE_L0, sarcomere_hint, warn_of_length, warn_of_spikes
-from xb_muscle_ros.trials.readers.recording import Draft
 from xb_muscle_ros.trials.trial import Array, Phase
 
 # Beyond these it is no muscle's length, or its unit is wrong. A whole muscle may go slack, its length near 0.

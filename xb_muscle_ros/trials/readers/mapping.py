@@ -24,7 +24,7 @@ from xb_muscle_ros.trials.readers.columns import (
     trial_column,
 )
 from xb_muscle_ros.trials.readers.description import FACTS, LENGTHS_OF, ImportMapping
-from xb_muscle_ros.trials.readers.numerals import DECIMALS
+from xb_muscle_ros.trials.readers.table import DECIMALS
 from xb_muscle_ros.trials.readers.tree import Keys, check_keys
 from xb_muscle_ros.trials.readers.units import finite
 

@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.readers.base import Pending, Reader
+from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled
-from xb_muscle_ros.trials.readers.recording import Recording, Signal
 from xb_muscle_ros.trials.trial import Array
 
 TEST_START_S = 0.005

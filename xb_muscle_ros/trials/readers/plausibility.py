@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from xb_muscle_ros.trials.readers.recording import Draft, Signal
+from xb_muscle_ros.trials.readers.base import Draft, Signal
 from xb_muscle_ros.trials.trial import Array
 
 # Isometric stress of muscle at full activation, weak to strong, Pa.

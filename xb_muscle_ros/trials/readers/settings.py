@@ -96,8 +96,9 @@ class ImportSettings:
                 f"{path}: no {suffix} file in its folder has an isometric force at pCa {mapping.f0_at_pca:g}, so F0 is "
                 "not known; add that trial, or give f0 in the mapping or by --f0"
             )
-        digest = hashlib.sha256(f"{digest} {found.f0.value!r} {found.note}".encode()).hexdigest()
-        return Prepared(path, reader, replace(mapping, f0=found.f0, f0_note=found.note), digest)
+        f0, note = found
+        digest = hashlib.sha256(f"{digest} {f0.value!r} {note}".encode()).hexdigest()
+        return Prepared(path, reader, replace(mapping, f0=f0, f0_note=note), digest)
 
     def _built(self, reader: Reader, matching: tuple[int, ...]) -> tuple[ImportMapping, str]:
         """The mapping of files of a format that some of the cases match, and its digest."""
@@ -147,15 +148,10 @@ def _cases(told: object, where: str) -> list[tuple[re.Pattern[str], Mapping[str,
 _SAME_PCA = 1e-6
 
 
-class FoundF0(NamedTuple):
-    """F0, and where it comes from, in words."""
-
-    f0: Quantity
-    note: str
-
-
-def isometric_f0(folder: Path, suffix: str, reader: Reader, mapping: ImportMapping, pca: float) -> FoundF0 | None:
-    """F0 of the preparation whose files a folder holds; None where no file tells it.
+def isometric_f0(
+    folder: Path, suffix: str, reader: Reader, mapping: ImportMapping, pca: float
+) -> tuple[Quantity, str] | None:
+    """F0 of the preparation whose files a folder holds, and its origin in words; None where no file tells it.
 
     Args:
         folder: of the preparation.
@@ -165,17 +161,17 @@ def isometric_f0(folder: Path, suffix: str, reader: Reader, mapping: ImportMappi
         pca: of the trial looked for. Where several have it, the largest force counts: a fibre runs down.
     """
     assert mapping.force is not None  # the mapping was checked
-    told = replace(mapping, f0=None, f0_at_pca=None)
+    without_f0 = replace(mapping, f0=None, f0_at_pca=None)
     found = [
         (force, file.name)
         for file in sorted(folder.iterdir())
         if file.suffix.lower() == suffix and file.is_file()
-        for force in _forces(file, reader, told, pca)
+        for force in _forces(file, reader, without_f0, pca)
     ]
     force, name = max(found, key=lambda each: each[0], default=(0.0, ""))
     if force <= 0.0:
         return None
-    return FoundF0(Quantity(force, mapping.force.unit.kind), f", the initial isometric force at pCa {pca:g} in {name}")
+    return Quantity(force, mapping.force.unit.kind), f", the initial isometric force at pCa {pca:g} in {name}"
 
 
 def _forces(file: Path, reader: Reader, mapping: ImportMapping, pca: float) -> Iterator[float]:
