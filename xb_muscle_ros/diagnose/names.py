@@ -70,4 +70,4 @@ FAMILY: Mapping[Name, str] = MappingProxyType(
 MECHANISMS: tuple[Name, ...] = tuple(Name)[: tuple(Name).index(Name.PCA_SHIFT)]
 """Names that are physics."""
 MEASUREMENT: tuple[Name, ...] = tuple(Name)[len(MECHANISMS) :]
-"""Names that are faults of the measurement: the rows of `measurement.faults.FAULTS`."""
+"""Names that are faults of the measurement: the rows of `measurement.artefacts.ARTEFACTS`."""

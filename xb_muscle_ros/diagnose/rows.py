@@ -16,7 +16,7 @@ from xb_muscle_ros.diagnose.result import Law, Nuisance, OfStudyFibre, OfTrial, 
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.searching import Searched
 from xb_muscle_ros.diagnose.tracing import Traced
-from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 from xb_muscle_ros.models.parameters import PARAMETERS
 
 Array = npt.NDArray[np.float64]
@@ -123,7 +123,7 @@ def nuisances(study: Searched, chosen: Names) -> tuple[Nuisance, ...]:
             if c.group is not None:
                 rows.append(
                     Nuisance(
-                        fibre=study.fibres[i].name, name=c.name, group=c.group, unit=FAULTS[c.name].unit,
+                        fibre=study.fibres[i].name, name=c.name, group=c.group, unit=ARTEFACTS[c.name].unit,
                         value=fit.values[c.label], sd=fit.sds[c.label], prior_sd=system.error_sd(c.name),
                         before=base.values.get(c.label),
                     )

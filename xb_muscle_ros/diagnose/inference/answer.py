@@ -25,7 +25,8 @@ from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import Names, ordered
 from xb_muscle_ros.fit.coordinates import Coordinate
-from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS as ARTEFACTS_BY_NAME
+from xb_muscle_ros.measurement.artefacts import ORDINARY
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.parameters import PARAMETERS
 
@@ -199,7 +200,7 @@ def _of_all(judged: Judged, names: Names, name: Name) -> tuple[Parameter, ...]:
 
 
 def _unit(c: Coordinate) -> str:
-    return FAULTS[c.name].unit if c.group is not None else PARAMETERS[c.name].unit
+    return ARTEFACTS_BY_NAME[c.name].unit if c.group is not None else PARAMETERS[c.name].unit
 
 
 def _at_bound(c: Coordinate, z: float) -> bool:

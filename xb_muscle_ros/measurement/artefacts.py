@@ -1,4 +1,4 @@
-"""The faults a measurement may have, as one table: name, size to expect, and what shares one value.
+"""The artefacts a measurement may have, as one table: name, size to expect, and what shares one value.
 
 What real sets show of the ordinary ones (how, and by which script: docs/evidence.md, Ordinary measurement error):
 
@@ -23,14 +23,14 @@ from typing import NamedTuple
 
 
 class Scope(enum.Enum):
-    """What shares one value of a fault."""
+    """What shares one value of an artefact."""
 
     TRIAL = "trial"
     SOLUTION = "solution"
     STUDY = "study"
 
 
-class Fault(NamedTuple):
+class Artefact(NamedTuple):
     """One row of the table.
 
     Attributes:
@@ -39,7 +39,7 @@ class Fault(NamedTuple):
         meaning: what it does to the recording, in a line.
         scope: what shares one value.
         sd: standard deviation to expect: the prior of a fit, normal around 0.
-        lower, upper: beyond these it is no fault but another experiment.
+        lower, upper: beyond these it is no artefact but another experiment.
         on_input: it changes what the fibre was given (length, calcium), so that the model has to run again.
     """
 
@@ -54,19 +54,23 @@ class Fault(NamedTuple):
 
 
 _ROWS = (
-    Fault(
+    Artefact(
         "pca_shift", "1", "true pCa minus stated pCa of a bathing solution", Scope.SOLUTION, 0.05, -0.5, 0.5, True
     ),
-    Fault("length_gain", "1", "true over recorded length change, minus 1", Scope.STUDY, 0.02, -0.3, 0.3, True),
-    Fault("run_down", "1", "share of its force that is lost from trial to trial", Scope.STUDY, 0.005, -0.2, 0.2, False),
-    Fault("force_offset", "F0", "recorded force at no force", Scope.TRIAL, 0.005, -0.2, 0.2, False),
-    Fault("force_drift", "F0/s", "rise of recorded force at constant force", Scope.TRIAL, 0.002, -0.1, 0.1, False),
-    Fault("time_shift", "s", "by how much force is recorded later than length", Scope.STUDY, 7e-4, -0.01, 0.01, False),
-    Fault("transducer_lag", "s", "time constant of the force transducer", Scope.STUDY, 5e-4, 0.0, 0.02, False),
+    Artefact("length_gain", "1", "true over recorded length change, minus 1", Scope.STUDY, 0.02, -0.3, 0.3, True),
+    Artefact(
+        "run_down", "1", "share of its force that is lost from trial to trial", Scope.STUDY, 0.005, -0.2, 0.2, False
+    ),
+    Artefact("force_offset", "F0", "recorded force at no force", Scope.TRIAL, 0.005, -0.2, 0.2, False),
+    Artefact("force_drift", "F0/s", "rise of recorded force at constant force", Scope.TRIAL, 0.002, -0.1, 0.1, False),
+    Artefact(
+        "time_shift", "s", "by how much force is recorded later than length", Scope.STUDY, 7e-4, -0.01, 0.01, False
+    ),
+    Artefact("transducer_lag", "s", "time constant of the force transducer", Scope.STUDY, 5e-4, 0.0, 0.02, False),
 )  # fmt: skip
 
-FAULTS: Mapping[str, Fault] = MappingProxyType({row.name: row for row in _ROWS})
-"""All faults by name."""
+ARTEFACTS: Mapping[str, Artefact] = MappingProxyType({row.name: row for row in _ROWS})
+"""All measurement artefacts by name."""
 
 ORDINARY: tuple[str, ...] = ("pca_shift", "length_gain", "run_down", "force_offset", "time_shift")
-"""Faults that every real set has a little of, in the order of `FAULTS`: part of every model unless asked otherwise."""
+"""Those that every real set has a little of, in the order of the table: part of every model unless asked otherwise."""
