@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from types import TracebackType
+from contextlib import AbstractContextManager
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
@@ -18,7 +18,7 @@ from xb_muscle_ros.plant.translation import RampAndHold
 _ANSWER_S = 10.0
 
 
-class LiveDrive:
+class LiveDrive(AbstractContextManager["LiveDrive"]):
     """Muscles that are the fibres of a `muscle_node` in lockstep; ends with the ``with`` block."""
 
     def __init__(
@@ -92,12 +92,7 @@ class LiveDrive:
         """Leave the graph."""
         self._link.close()
 
-    def __enter__(self) -> LiveDrive:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
