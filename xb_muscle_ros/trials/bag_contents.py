@@ -19,6 +19,8 @@ from xb_muscle_ros.trials import fast_yaml, ros_types
 from xb_muscle_ros.trials.bag_files import METADATA, mcap_files
 from xb_muscle_ros.trials.mcap_records import Message, Recording, read_recording
 
+_IDL_BEGIN = "=" * 80 + "\n"
+
 
 @dataclass(frozen=True)
 class BagContents:
@@ -178,9 +180,6 @@ def _custom_data(
 def _strings(information: dict[str, Any] | None) -> dict[str, str]:
     data = None if information is None else information.get("custom_data")
     return {str(key): str(value) for key, value in data.items()} if isinstance(data, dict) else {}
-
-
-_IDL_BEGIN = "=" * 80 + "\n"
 
 
 class AnyMessage(NamedTuple):

@@ -22,6 +22,9 @@ from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
 from xb_muscle_ros.trials.stamps import not_after, to_ns
 from xb_muscle_ros.trials.trial import Array, Trial
 
+# Whose message definitions and type hashes the bags hold.
+ROS_DISTRO = "jazzy"
+
 
 class _Series(NamedTuple):
     """Messages of one topic: stamps in ns, names, and arrays of shape (messages, names) by their field."""
@@ -144,10 +147,6 @@ def _stamps(time_s: Array, columns: tuple[Array, ...], topic: str, where: str) -
     return [int(stamp) for stamp in stamps]
 
 
-# Whose message definitions and type hashes the bags hold.
-ROS_DISTRO = "jazzy"
-
-
 class _Mcap(McapWriter):
     def __init__(self, path: Path, compression: CompressionMode) -> None:
         super().__init__(path, compression)
@@ -163,6 +162,10 @@ class _Mcap(McapWriter):
 
 class BagWriter(Writer):
     """Writes an MCAP bag of rosbag2's version 9 to a folder that does not exist yet.
+
+    The writer of `rosbags` with three things made to fit: the MCAP file's name, ``custom_data`` and ``ros_distro``.
+    rosbag2 numbers the files of a bag. And the YAML writer within `rosbags` wraps long lines in ways that add or lose
+    spaces, in the metadata file and in its copy within the MCAP file; here nothing is wrapped.
 
     Args:
         folder: the folder to make.

@@ -22,6 +22,10 @@ from xb_muscle_ros.trials.readers.registry import READERS, recording_suffixes
 from xb_muscle_ros.trials.readers.settings import ImportSettings, MappingError, Prepared
 from xb_muscle_ros.trials.trial import Trial
 
+SOURCE = "import_source"
+SETTINGS = "import_settings"
+_BLOCK_BYTES = 1 << 20
+
 
 class Imported(NamedTuple):
     """A bag was written."""
@@ -194,11 +198,6 @@ def _recordings_in(folder: Path, out: Path | None) -> Iterator[Path]:
                 yield path
         elif path.suffix.lower() in recording_suffixes():
             yield path
-
-
-SOURCE = "import_source"
-SETTINGS = "import_settings"
-_BLOCK_BYTES = 1 << 20
 
 
 class Provenance(NamedTuple):

@@ -16,6 +16,10 @@ from xb_muscle_ros.trials.checks import check_values
 from xb_muscle_ros.trials.completing import Known, complete, counted
 from xb_muscle_ros.trials.trial import Trial
 
+_BAG = re.compile(r"bag (.*?): ")
+_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+_NAMED = 3
+
 
 class Study(NamedTuple):
     """Trials of a run in the order of the bags, and the lines that hold for several of them."""
@@ -98,11 +102,6 @@ def _chosen(bag: TrialBag, fibre: str, only: str | None) -> str:
     listed = ", ".join(f"'{name}'" for name in bag.fibres)
     remedy = "--trials-of takes one of them"
     raise UserError(f"bag {bag.path} is of {'fibre' if alone else 'fibres'} {listed}, not of '{names[0]}'; {remedy}")
-
-
-_BAG = re.compile(r"bag (.*?): ")
-_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-_NAMED = 3
 
 
 def alike(lines: Iterable[str]) -> list[str]:

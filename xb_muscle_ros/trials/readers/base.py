@@ -15,6 +15,8 @@ from xb_muscle_ros.trials.readers.columns import FILE
 from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.trial import Array
 
+_BEGIN_BYTES = 4096
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -128,9 +130,6 @@ class Draft:
     def warn(self, line: str) -> None:
         """Add a warning, with the trial's name before it."""
         self.warnings.append(f"{self.where}: {line}")
-
-
-_BEGIN_BYTES = 4096
 
 
 class Pending(NamedTuple):

@@ -24,6 +24,9 @@ SIGNALS = {
 _PLACE = {FILE: ("column",), BAG: ("topic", "field")}
 _PULSE_GAP_S = 0.015
 _SECONDS = Unit("time", 1.0)
+NEVER = "never"
+FORCE_DROP = "force_drop"
+_CONSTANTS = {"rest": "0.05 uM", "tetanus": "8 uM", "rise": "50 ms", "decay": "30 ms"}
 
 
 def read_column(columns: Keys, key: str, kind: str) -> Column:
@@ -83,11 +86,6 @@ def trial_column(columns: Keys, kind: str) -> str | None:
     if kind == BAG:
         raise UserError(f"{columns.where}: columns.trial is for tables; a bag is one trial; leave it out")
     return columns.below("trial", "column").text("column", "name the column")
-
-
-NEVER = "never"
-FORCE_DROP = "force_drop"
-_CONSTANTS = {"rest": "0.05 uM", "tetanus": "8 uM", "rise": "50 ms", "decay": "30 ms"}
 
 
 def read_activation(mapping: Keys) -> Activation | None:

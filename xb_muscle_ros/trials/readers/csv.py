@@ -19,6 +19,16 @@ from xb_muscle_ros.trials.readers.description import Column, ImportMapping, fill
 from xb_muscle_ros.trials.readers.table import Table, looks_like_text, number, read_table
 from xb_muscle_ros.trials.trial import Trial
 
+# A column of this name tells trials apart without being asked for.
+TRIAL_COLUMN = "trial"
+# Time that starts anew comes back to its first value within so many steps, and goes on for so many samples.
+_SAME_START_STEPS = 2.0
+_LEAST_SAMPLES = 10
+# pCa is noted to a tenth.
+_SAME_PCA = 0.05
+_PCA_COLUMN = re.compile(r"p[ _-]?ca([^a-z0-9]|$)", re.IGNORECASE)
+_PCA_IN_NAME = re.compile(r"p[ _-]?ca[ _=:-]*(\d+(?:[.,]\d+)?)", re.IGNORECASE)
+
 
 class CsvReader(Reader):
     """Comma, semicolon or tab separated columns below a header line.
@@ -84,17 +94,6 @@ def _recording(table: Table, mapping: ImportMapping, part: Part, notices: tuple[
         facts,
         warnings=(*notices, *check_pca(table, mapping, part, facts["pca"])),
     )
-
-
-# A column of this name tells trials apart without being asked for.
-TRIAL_COLUMN = "trial"
-# Time that starts anew comes back to its first value within so many steps, and goes on for so many samples.
-_SAME_START_STEPS = 2.0
-_LEAST_SAMPLES = 10
-# pCa is noted to a tenth.
-_SAME_PCA = 0.05
-_PCA_COLUMN = re.compile(r"p[ _-]?ca([^a-z0-9]|$)", re.IGNORECASE)
-_PCA_IN_NAME = re.compile(r"p[ _-]?ca[ _=:-]*(\d+(?:[.,]\d+)?)", re.IGNORECASE)
 
 
 class Part(NamedTuple):

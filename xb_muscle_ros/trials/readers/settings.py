@@ -26,6 +26,7 @@ from xb_muscle_ros.trials.readers.units import Quantity
 VERSION = 2
 # Mappings, and F0 of preparations, that are kept: files come kind by kind and folder by folder.
 _KEPT = 64
+_SAME_PCA = 1e-6
 
 
 class MappingError(UserError):
@@ -143,9 +144,6 @@ def _cases(told: object, where: str) -> list[tuple[re.Pattern[str], Mapping[str,
             raise UserError(f"{where}: {keys.path} has {nested}; that holds for all files")
         cases.append((files, {key: value for key, value in tree.items() if key != "files"}))
     return cases
-
-
-_SAME_PCA = 1e-6
 
 
 def isometric_f0(

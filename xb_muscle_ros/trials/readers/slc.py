@@ -30,6 +30,13 @@ CHANNELS = {
 }
 _DATA = "Data"
 _INFO = ("_FILE_INFO_START_", "_FILE_INFO_STOP_")
+# The motor is at rest at the begin; its mean position then is the length in the header.
+_REST_SAMPLES = 100
+# The header may name the rate another program was told; then the time column is right.
+_SAME_RATE = 0.01
+# Notes of the experimenter that tell the trials of a fibre apart, and their units.
+_NOTED = {"Species": "", "Muscle": "", "Temperature": " °C", "pH": " pH", "Drug": ""}
+_PCA_IN_NAME = re.compile(r"(\d\d)pCa", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -178,15 +185,6 @@ def _text(raw: bytes) -> str:
         return raw.decode("utf-8").strip()
     except UnicodeDecodeError:
         return raw.decode("latin-1").strip()
-
-
-# The motor is at rest at the begin; its mean position then is the length in the header.
-_REST_SAMPLES = 100
-# The header may name the rate another program was told; then the time column is right.
-_SAME_RATE = 0.01
-# Notes of the experimenter that tell the trials of a fibre apart, and their units.
-_NOTED = {"Species": "", "Muscle": "", "Temperature": " °C", "pH": " pH", "Drug": ""}
-_PCA_IN_NAME = re.compile(r"(\d\d)pCa", re.IGNORECASE)
 
 
 class SlcReader(Reader):

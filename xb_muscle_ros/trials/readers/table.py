@@ -26,6 +26,14 @@ _WITH_POINT = re.compile(r"[+-]?(\d*\.\d+|\d+\.)([eE][+-]?\d+)?")
 # 1,234 may be a little more than one, or more than a thousand.
 _EITHER = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 _GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?P<mark>[ '.,\u00a0\u2009\u202f\u2019])\d{3}(?:(?P=mark)\d{3})*(?:[.,]\d+)?")
+_DELIMITERS = "\t;,"
+# Excel tells itself the delimiter in a line before the header.
+_SEPARATOR_LINE = re.compile(r"sep=(.)", re.IGNORECASE)
+_BEGINS = {
+    codecs.BOM_UTF8: "utf-8-sig",
+    codecs.BOM_UTF16_LE: "utf-16",
+    codecs.BOM_UTF16_BE: "utf-16",
+}
 
 
 def with_comma(cells: Iterable[tuple[int, str]], sure: bool = False) -> tuple[int, str] | None:
@@ -58,11 +66,6 @@ def number(text: str, decimal: str = POINT) -> float:
 def is_grouped(text: str) -> bool:
     """Whether a cell that is no number is one with marks of thousands."""
     return _GROUPED.fullmatch(text) is not None
-
-
-_DELIMITERS = "\t;,"
-# Excel tells itself the delimiter in a line before the header.
-_SEPARATOR_LINE = re.compile(r"sep=(.)", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -220,13 +223,6 @@ def _cells(rows: tuple[tuple[int, tuple[str, ...]], ...]) -> Iterator[tuple[int,
 def _plain(name: str) -> str:
     """A column's name as it is compared: the two signs for micro are one."""
     return unicodedata.normalize("NFKC", name).strip()
-
-
-_BEGINS = {
-    codecs.BOM_UTF8: "utf-8-sig",
-    codecs.BOM_UTF16_LE: "utf-16",
-    codecs.BOM_UTF16_BE: "utf-16",
-}
 
 
 def looks_like_text(begin: bytes) -> bool:
