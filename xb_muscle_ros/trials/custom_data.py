@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.readers.units import finite
 from xb_muscle_ros.trials.trial import Phase, TrialFacts
 
 _CONTROL = ("Cc", "Cs", "Zl", "Zp")
@@ -54,21 +55,12 @@ def facts_from_custom_data(data: Mapping[str, str], where: str, fibre: str, tria
         UserError: a number or the phases cannot be read.
     """
     known: dict[str, Any] = {name: data[name] for name in _TEXTS if name in data}
-    known |= {n: _number(data[n], n, where) for n in _OPTIONAL_NUMBERS + _POSITIVE_NUMBERS if n in data}
+    numbers = [name for name in _OPTIONAL_NUMBERS + _POSITIVE_NUMBERS if name in data]
+    known |= {name: finite(data[name], f"custom_data {name}", f"bag {where}") for name in numbers}
     for name in _POSITIVE_NUMBERS:
         if known.get(name, 1.0) <= 0.0:
             raise UserError(f"bag {where}: custom_data {name} is {known[name]!r}; allowed are numbers above 0")
     return replace(TrialFacts(fibre, trial, phases=_phases(data.get("phases", "[]"), where)), **known)
-
-
-def _number(text: str, name: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise UserError(f"bag {where}: custom_data {name} is '{text}'; allowed are finite numbers")
-    return value
 
 
 def _phases(text: str, where: str) -> tuple[Phase, ...]:

@@ -148,16 +148,12 @@ def _numbers(header: SlcHeader, rows: list[bytes], names: tuple[str, ...]) -> Ar
     except ValueError:
         pass
     for i, row in enumerate(cells):
-        line = header.lines + i + 1
+        where = f"{header.path}, line {header.lines + i + 1}"
         if len(row) != len(names):
-            raise UserError(
-                f"{header.path}, line {line} has {len(row)} cells; needed are {len(names)}: {', '.join(names)}"
-            )
-        for name, cell in zip(names, row, strict=True):
-            if math.isnan(number(cell.decode("latin-1"))) and cell.lower() != b"nan":
-                raise UserError(
-                    f"{header.path}, line {line}, column '{name}' holds '{cell.decode('latin-1')}'; needed is a number"
-                )
+            raise UserError(f"{where} has {len(row)} cells; needed are {len(names)}: {', '.join(names)}")
+        for name, text in zip(names, (cell.decode("latin-1") for cell in row), strict=True):
+            if math.isnan(number(text)) and text.lower() != "nan":
+                raise UserError(f"{where}, column '{name}' holds '{text}'; needed is a number")
     raise UserError(f"{header.path} has no rows below its header; copy it again")
 
 
