@@ -7,6 +7,7 @@ import logging
 import platform
 import threading
 import warnings
+from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as Unanswered
 from typing import TYPE_CHECKING
@@ -63,13 +64,20 @@ def connect(address: str) -> Client:
 
 def _compare(client: Client, address: str) -> None:
     """Refuse a scheduler of other versions; workers look for themselves, with each task."""
-    ask, name = client.run_on_scheduler, "distributed"  # by functions that it has without this package
-    pythons = (ask(platform.python_version), platform.python_version())
-    versions = {
-        "Python": [".".join(each.split(".")[:2]) for each in pythons],
-        name: [ask(importlib.metadata.version, name), importlib.metadata.version(name)],
-    }
-    for name, (theirs, ours) in versions.items():
-        if theirs != ours:
+    theirs, ours = _versions(client.run_on_scheduler), _versions(_here)
+    for name, version in ours.items():
+        if theirs[name] != version:
             client.close(timeout=PATIENCE_S)
-            raise UserError(f"Dask scheduler {address} has {name} {theirs}, this process {ours}; give both the same")
+            raise UserError(
+                f"Dask scheduler {address} has {name} {theirs[name]}, this process {version}; give both the same"
+            )
+
+
+def _versions(call: Callable[..., str]) -> dict[str, str]:
+    """What client and scheduler must have in common; `call` calls a function where the versions are asked for."""
+    python = ".".join(call(platform.python_version).split(".")[:2])
+    return {"Python": python, "distributed": call(importlib.metadata.version, "distributed")}
+
+
+def _here(function: Callable[..., str], *arguments: str) -> str:
+    return function(*arguments)
