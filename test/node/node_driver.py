@@ -15,8 +15,8 @@ class Driver:
     """Publishes to a muscle node and collects what it says.
 
     Attributes:
-        link: see `xb_muscle_ros.node.link`.
-        process: the node's; see `xb_muscle_ros.node.process`.
+        link: see `xb_muscle_ros.node.client.link`.
+        process: the node's; see `xb_muscle_ros.node.client.process`.
         forces, moments, reports: messages so far; reports as dictionaries, level and message among them.
     """
 
@@ -24,7 +24,7 @@ class Driver:
         from diagnostic_msgs.msg import DiagnosticArray
         from sensor_msgs.msg import JointState
 
-        from xb_muscle_ros.node.link import Link
+        from xb_muscle_ros.node.client.link import Link
 
         self.process = process
         self.domain = domain

@@ -38,7 +38,7 @@ def before(domain: int, request: pytest.FixtureRequest) -> Iterator[Callable[...
     """Publish something in a namespace, then start a node there."""
     from node_driver import Driver
 
-    from xb_muscle_ros.node.process import NodeProcess
+    from xb_muscle_ros.node.client.process import NodeProcess
 
     made: list[Any] = []
 
@@ -115,7 +115,7 @@ def test_overrides_of_one_topic_leave_the_other_alone(domain: int, tmp_path: Pat
     """Calcium transient local by a parameter file: lengths of a volatile publisher still come."""
     from node_driver import Driver
 
-    from xb_muscle_ros.node.process import NodeProcess
+    from xb_muscle_ros.node.client.process import NodeProcess
 
     overrides = {"/quality/muscle/calcium": {"subscription": {"durability": "transient_local", "depth": 7}}}
     path = tmp_path / "qos.yaml"
@@ -194,7 +194,7 @@ def test_input_that_is_refused_for_good_is_an_error_with_the_remedy(start: Calla
 
 def test_two_nodes_of_one_name_say_so(start: Callable[..., Any]) -> None:
     """The second one finds the first."""
-    from xb_muscle_ros.node.process import NodeProcess
+    from xb_muscle_ros.node.client.process import NodeProcess
 
     driver = start(mode="realtime")
     given = {"fiber_file": FIBRE}

@@ -19,7 +19,7 @@ MODEL = "3state_coop"
 @pytest.fixture(scope="module")
 def nodes(new_domain: Callable[[], int]) -> Iterator[int]:
     """Muscle nodes in lockstep for both scenes, in namespaces of their own; their ROS domain."""
-    from xb_muscle_ros.node.process import NodeProcess
+    from xb_muscle_ros.node.client.process import NodeProcess
 
     domain = new_domain()
     wanted = {"fiber_file": "18Dec2017a", "model": MODEL, "mode": "lockstep"}

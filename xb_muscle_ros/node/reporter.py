@@ -4,43 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.node.arrivals import Arrivals
 from xb_muscle_ros.node.diagnostics import Report, diagnostics
-from xb_muscle_ros.node.inlet import Refused
-from xb_muscle_ros.node.inputs import Counts
-from xb_muscle_ros.node.several import enumerated
-from xb_muscle_ros.node.status import Status
-
-
-class Stepping(Protocol):
-    """What is reported of the stepping."""
-
-    @property
-    def counts(self) -> Counts:
-        """What was odd about the input that was taken."""
-
-    def status(self) -> Status:
-        """How it goes."""
-
-
-class Inlet(Protocol):
-    """What is reported of the input."""
-
-    refused: Counts
-    ignored_names: int
-    last_length_s: float | None
-    refusing: dict[tuple[str, str], Refused]
-
-
-class Outlet(Protocol):
-    """What is reported of the output."""
-
-    pushed: tuple[str, float] | None
+from xb_muscle_ros.node.inlet import Inlet
+from xb_muscle_ros.node.names import enumerated
+from xb_muscle_ros.node.outputs import OutputMessages
+from xb_muscle_ros.node.stepping import Stepping
 
 
 class Reporter:
@@ -53,7 +27,7 @@ class Reporter:
         self._report = Report(node.get_fully_qualified_name(), mode, "unconfigured")
         self._stepping: Stepping | None = None
         self._inlet: Inlet | None = None
-        self._outlet: Outlet | None = None
+        self._outlet: OutputMessages | None = None
         self._arrivals: Mapping[str, Arrivals] = {}
         self._lost: dict[str, int] = {}
         self._last = (time.monotonic(), time.process_time(), 0, 0, 0)
@@ -63,7 +37,7 @@ class Reporter:
         fibres: Sequence[Fibre],
         stepping: Stepping,
         inlet: Inlet,
-        outlet: Outlet,
+        outlet: OutputMessages,
         arrivals: Mapping[str, Arrivals] = {},
     ) -> None:
         """Report on these from now on; `arrivals` by topic."""

@@ -7,9 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.node.lockstep import Lockstep
-from xb_muscle_ros.node.realtime import Realtime
-from xb_muscle_ros.node.saved_state import load_state, load_states, save_state, save_states
+from xb_muscle_ros.node.saved_state import load_state, save_state
 from xb_muscle_ros.node.status import Log
 
 
@@ -46,14 +44,10 @@ class StateFile:
         self._log.info(self._load())
 
     def _save(self) -> str:
-        stepping = self._known()
-        save = save_state if isinstance(stepping, (Lockstep, Realtime)) else save_states
-        return save(self._name(), self._mode, stepping)
+        return save_state(self._name(), self._mode, self._known())
 
     def _load(self) -> str:
-        stepping = self._known()
-        load = load_state if isinstance(stepping, (Lockstep, Realtime)) else load_states
-        return load(self._name(), self._mode, stepping)
+        return load_state(self._name(), self._mode, self._known())
 
     def _known(self) -> Any:
         stepping = self._stepping()

@@ -9,8 +9,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.node.inputs import Scale
 from xb_muscle_ros.node.lateness import LatenessSummary
+from xb_muscle_ros.node.rules import Scale
 
 
 class Log(Protocol):

@@ -6,7 +6,7 @@ from types import TracebackType
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.node.link import Link
+from xb_muscle_ros.node.client.link import Link
 from xb_muscle_ros.plant.drives import FibreDrive, without_parallel
 from xb_muscle_ros.plant.junction import Junction
 from xb_muscle_ros.plant.loop import DURATION_S, Trace, couple, move

@@ -14,9 +14,9 @@ from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.node.client.link import Link
 from xb_muscle_ros.node.diagnostics import status_name
-from xb_muscle_ros.node.inputs import stamp_ns
-from xb_muscle_ros.node.link import Link
+from xb_muscle_ros.node.rules import stamp_ns
 from xb_muscle_ros.plant.plant import Architecture, Array
 
 FIND_S = 10.0

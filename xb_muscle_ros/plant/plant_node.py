@@ -48,7 +48,7 @@ class PlantNode:
         from sensor_msgs.msg import JointState
 
         from xb_muscle_ros.models.fibre_file import load_fibre
-        from xb_muscle_ros.node.link import Link
+        from xb_muscle_ros.node.client.link import Link
         from xb_muscle_ros.plant.body import Body
         from xb_muscle_ros.plant.muscle_end import MuscleEnd
         from xb_muscle_ros.plant.translation import RampAndHold

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from xb_muscle_ros.node.inputs import LENGTH_CHANGE_L0
+from xb_muscle_ros.node.rules import LENGTH_CHANGE_L0
 from xb_muscle_ros.plant.loop import Trace
 from xb_muscle_ros.plant.plant import Array
 

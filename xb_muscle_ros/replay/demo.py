@@ -52,8 +52,8 @@ def demo(recordings: Path | None, out: Path, live: bool) -> int:
     if live and importlib.util.find_spec("rclpy") is None:
         print("\nROS 2 is not installed here (rclpy): the part through muscle_node is left out")
     elif live:
-        from xb_muscle_ros.node.player import play_live
-        from xb_muscle_ros.node.process import NodeProcess, private_domain
+        from xb_muscle_ros.node.client.player import play_live
+        from xb_muscle_ros.node.client.process import NodeProcess, private_domain
 
         domain = private_domain()
         with NodeProcess(domain, {"fiber_file": find_fibre_file(FIBRE), "mode": "lockstep"}):
@@ -74,7 +74,7 @@ def demo(recordings: Path | None, out: Path, live: bool) -> int:
 
 def _augmented_in_realtime() -> None:
     """A diagnosed model in a realtime node, and how punctual that is."""
-    from xb_muscle_ros.node.timing import run_timing
+    from xb_muscle_ros.node.client.timing import run_timing
 
     path = next((f / AUGMENTED for f in fibre_folders() if (f / AUGMENTED).is_file()), None)
     if path is None:

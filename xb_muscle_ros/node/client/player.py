@@ -16,10 +16,10 @@ from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.node.client.link import Link
 from xb_muscle_ros.node.configuration import flat
-from xb_muscle_ros.node.inputs import stamp_ns
-from xb_muscle_ros.node.link import Link
 from xb_muscle_ros.node.outputs import room
+from xb_muscle_ros.node.rules import stamp_ns
 from xb_muscle_ros.trials.ros_types import to_ns
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
 from xb_muscle_ros.trials.trial import Trial

@@ -16,11 +16,11 @@ from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.node.inputs import stamp_ns
-from xb_muscle_ros.node.link import Link
-from xb_muscle_ros.node.measured import START_S, Measured
+from xb_muscle_ros.node.client.link import Link
+from xb_muscle_ros.node.client.measured import START_S, Measured
+from xb_muscle_ros.node.client.process import NodeProcess, private_domain
 from xb_muscle_ros.node.outputs import room
-from xb_muscle_ros.node.process import NodeProcess, private_domain
+from xb_muscle_ros.node.rules import stamp_ns
 from xb_muscle_ros.node.waiting import make_waiter
 
 _INPUT_HZ = 500.0
