@@ -90,7 +90,7 @@ def test_rate_can_be_set_while_inactive(start: Callable[..., Any]) -> None:
 
 def test_node_and_plain_timer_are_measured_side_by_side(domain: int) -> None:
     """All figures of a short run; which is better is not for a test to say."""
-    from xb_muscle_ros.node.client.timing import run_beside_plain_timer
+    from xb_muscle_ros.bench.timing import run_beside_plain_timer
 
     for figures in run_beside_plain_timer(3.0, 250.0):
         assert figures["ticks"] > 0.7 * 3.0 * 250.0
@@ -106,7 +106,7 @@ def test_node_and_plain_timer_are_measured_side_by_side(domain: int) -> None:
 
 def test_the_way_there_and_back_is_measured(domain: int) -> None:
     """With several fibres in each message."""
-    from xb_muscle_ros.node.client.timing import run_roundtrip
+    from xb_muscle_ros.bench.timing import run_roundtrip
 
     figures = run_roundtrip(3.0, 100.0, fibres=3)
     assert 50.0 < figures["p50_us"] <= figures["p99_us"] <= figures["p99.9_us"] <= figures["max_us"]

@@ -294,26 +294,23 @@ class _Sender:
     def __init__(self, fibre: str, inlet: Any) -> None:
         from sensor_msgs.msg import JointState
 
-        from xb_muscle_ros.node.outputs import room
-
         self._inlet = inlet
-        self._message = JointState(name=[fibre])
-        self._position = room(self._message, "position", 1)
+        self._message = JointState(name=[fibre], position=[0.0])
 
-    def _fill(self, stamp: int, value: float) -> None:
-        header = self._message.header.stamp
-        header.sec, header.nanosec = divmod(stamp, 1_000_000_000)
-        self._position[0] = value
+    def _filled(self, stamp: int, value: float) -> Any:
+        from xb_muscle_ros.node.outputs import set_stamp
+
+        set_stamp(self._message, stamp)
+        self._message.position[0] = value
+        return self._message
 
     def calcium(self, stamp: int, calcium_um: float) -> None:
         """Free calcium, µM."""
-        self._fill(stamp, calcium_um)
-        self._inlet.take_calcium(self._message)
+        self._inlet.take_calcium(self._filled(stamp, calcium_um))
 
     def length(self, stamp: int, length_m: float) -> None:
         """Fibre length, m."""
-        self._fill(stamp, length_m)
-        self._inlet.take_length(self._message)
+        self._inlet.take_length(self._filled(stamp, length_m))
 
 
 class _Log:

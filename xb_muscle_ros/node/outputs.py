@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import MutableSequence, Sequence
-from typing import Any, Protocol
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from sensor_msgs.msg import JointState
@@ -21,24 +21,6 @@ _MOMENTS = slice(_FIRST, _FIRST + len(MOMENTS))
 assert tuple(Outputs._fields[_MOMENTS]) == MOMENTS
 
 
-class Publisher(Protocol):
-    """What is used of an rclpy publisher."""
-
-    def publish(self, msg: Any) -> None:
-        """Send a message."""
-
-    def get_subscription_count(self) -> int:
-        """How many listen."""
-
-
-def room(message: JointState, field: str, size: int) -> MutableSequence[float]:
-    """Array of a message's field with room for `size` values: what is put into it is in the message."""
-    setattr(message, field, [0.0] * size)
-    # The message keeps a copy of what it is given; only its own array is worth holding on to.
-    values: MutableSequence[float] = getattr(message, field)
-    return values
-
-
 class OutputMessages:
     """Publishes forces (``muscle/force``) and moments (``muscle/moments``), of all fibres in one message each.
 
@@ -48,7 +30,8 @@ class OutputMessages:
         pushed: fibre and force (F0) of the strongest push since it was last cleared; None where all pulled.
     """
 
-    def __init__(self, fibres: Sequence[str], force: Publisher, moments: Publisher) -> None:
+    def __init__(self, fibres: Sequence[str], force: Any, moments: Any) -> None:
+        """Fill messages of these fibres; `force` and `moments` are publishers of rclpy."""
         self.pushed: tuple[str, float] | None = None
         self._names = list(fibres)
         self._to_force = force
@@ -85,13 +68,13 @@ class _Pair:
         self.force.name = list(fibres)
         self.moments.name = [f"{fibre}/{name}" for fibre in fibres for name in MOMENTS]
         self._position, self._velocity, self._effort = (
-            _array(self.force, field, len(fibres)) for field in ("position", "velocity", "effort")
+            array(self.force, field, len(fibres)) for field in ("position", "velocity", "effort")
         )
-        self._values = _array(self.moments, "position", len(self.moments.name))
+        self._values = array(self.moments, "position", len(self.moments.name))
 
     def fill(self, stamp_ns: int, outputs: Floats, scales: Floats) -> None:
         """Put forces in, and the contractile elements' lengths and velocities."""
-        _set_stamp(self.force, stamp_ns)
+        set_stamp(self.force, stamp_ns)
         reference, f0 = scales.T
         np.multiply(outputs[:, _FORCE], f0, out=self._effort)
         np.multiply(reference, 1.0 + outputs[:, _CE_LENGTH], out=self._position)
@@ -99,15 +82,18 @@ class _Pair:
 
     def fill_moments(self, stamp_ns: int, outputs: Floats) -> None:
         """Put the moments in."""
-        _set_stamp(self.moments, stamp_ns)
+        set_stamp(self.moments, stamp_ns)
         self._values[:] = outputs[:, _MOMENTS].ravel()
 
 
-def _set_stamp(message: JointState, stamp_ns: int) -> None:
+def set_stamp(message: JointState, stamp_ns: int) -> None:
+    """Put a time in ns into a message."""
     stamp = message.header.stamp
     stamp.sec, stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
 
 
-def _array(message: JointState, field: str, size: int) -> Floats:
-    """`room` as an array of NumPy on the same memory."""
-    return np.frombuffer(room(message, field, size), dtype=np.float64)  # type: ignore[call-overload, no-any-return, unused-ignore]
+def array(message: JointState, field: str, size: int) -> Floats:
+    """Array of a message's field with room for `size` values: what is put into it is in the message."""
+    setattr(message, field, [0.0] * size)
+    # The message keeps a copy of what it is given; only its own memory is worth holding on to.
+    return np.frombuffer(getattr(message, field), dtype=np.float64)  # type: ignore[no-any-return, unused-ignore]

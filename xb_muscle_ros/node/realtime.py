@@ -12,8 +12,8 @@ from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.node.names import Indices, enumerated, front
-from xb_muscle_ros.node.rules import LENGTH_CHANGE_L0, Counts, Scale, Trouble, inside, scale_of
+from xb_muscle_ros.node.names import enumerated, front
+from xb_muscle_ros.node.rules import LENGTH_CHANGE_L0, Counts, Scale, inside, scale_of
 from xb_muscle_ros.node.samples import Inputs, Samples
 from xb_muscle_ros.node.status import Account, Log, Snapshot, Status
 from xb_muscle_ros.node.stepping import Emit, Flags, Floats, outputs, step, stopped, use_threads
@@ -48,6 +48,7 @@ class Realtime:
     Attributes:
         batch: what is stepped; fibres may be exchanged between ticks.
         settings: may be exchanged between ticks; the rate counts at the next start.
+        take_calcium, take_length: see `Samples`.
     """
 
     def __init__(
@@ -78,6 +79,7 @@ class Realtime:
         self._names = [muscle.fibre.name for muscle in batch.muscles]
         scales = np.array([scale_of(muscle.fibre) for muscle in batch.muscles])
         self._samples = Samples(self._names, scales, log, simulated_time)
+        self.take_calcium, self.take_length = self._samples.take_calcium, self._samples.take_length
         # The thread's own; arrays are replaced, never changed, since callbacks read them.
         self._rest = np.stack([muscle.rest() for muscle in batch.muscles])
         self._rest[:, -1] = _REST_CALCIUM_UM
@@ -182,16 +184,6 @@ class Realtime:
         self._use_live(np.ones(len(states), dtype=np.bool_))
         if running:
             self.start()
-
-    def take_calcium(self, stamp: int, fibres: Indices, calcium_um: Floats) -> list[Trouble]:
-        """See `Samples`."""
-        return self._samples.take_calcium(stamp, fibres, calcium_um)
-
-    def take_length(
-        self, stamp: int, fibres: Indices, position_m: Floats, velocity_m_per_s: Floats | None
-    ) -> list[Trouble]:
-        """See `Samples`."""
-        return self._samples.take_length(stamp, fibres, position_m, velocity_m_per_s)
 
     def status(self) -> Status:
         """How it goes, over all fibres."""

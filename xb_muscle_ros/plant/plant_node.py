@@ -4,15 +4,13 @@
 
 from __future__ import annotations
 
-import signal
-import sys
+import functools
 import time
 from collections.abc import Callable
-from types import FrameType
 from typing import Any
 
-from xb_muscle_ros import programs
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.node import program
 from xb_muscle_ros.plant.plant_parameters import read
 
 USAGE = """\
@@ -239,55 +237,20 @@ class PlantNode:
 
 
 def main() -> None:
-    """Run the node until it is told to stop.
-
-    Raises:
-        SystemExit: code 0, or 2 after one line on stderr, where the user can mend something.
-    """
-    # As for the muscle node, which see.
-    programs.run(_main, reader_left=0)
+    """Run the node until it is told to stop; see `program.run`."""
+    program.run("plant_node", USAGE, _play)
 
 
-def _main() -> int:
-    asked: list[int] = []
+def _play(arguments: list[str], stop: program.Stop) -> None:
+    import rclpy
 
-    def stop(number: int, frame: FrameType | None) -> None:
-        asked.append(number)
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, stop)
+    del arguments
+    make = functools.partial(rclpy.create_node, "plant_node", automatically_declare_parameters_from_overrides=True)
+    plant = PlantNode(program.created(make), stop)
     try:
-        if "-h" in sys.argv or "--help" in sys.argv:
-            print(USAGE)
-            return 0
-        _run(lambda: bool(asked))
-    except UserError as error:
-        print(f"plant_node: {error}", file=sys.stderr)
-        return 2
-    return 0
-
-
-def _run(stop: Callable[[], bool]) -> None:
-    try:
-        import rclpy
-        from rclpy.utilities import try_shutdown
-
-        from xb_muscle_ros.node.arguments import begin, first_words
-    except ImportError as error:
-        raise UserError(f"ROS 2 cannot be imported ({error}); source a ROS 2 Jazzy, or run scripts/setup") from error
-    begin("plant_node", sys.argv[1:])
-    try:
-        node = rclpy.create_node("plant_node", automatically_declare_parameters_from_overrides=True)
-    except Exception as error:
-        raise UserError(f"the node cannot be created: {first_words(error)}; see --help") from error
-    try:
-        plant = PlantNode(node, stop)
-        try:
-            plant.run()
-        finally:
-            plant.close()
+        plant.run()
     finally:
-        try_shutdown()
+        plant.close()
 
 
 if __name__ == "__main__":

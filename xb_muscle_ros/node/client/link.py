@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from types import TracebackType
 from typing import Any
 
 import rclpy
@@ -73,9 +72,7 @@ class Link:
     def __enter__(self) -> Link:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -182,3 +179,25 @@ class Link:
         if account is None:
             raise UserError(f"node {self.peer} answers to reset with '{response.message}'; use the same version there")
         return account
+
+    def begin(
+        self, send: Callable[[], None], answered: Callable[[], bool], timeout_s: float, patience_s: float
+    ) -> bool:
+        """Reset the muscle node and send it something, both again while its answers may not find their way yet.
+
+        Args:
+            send: called after every reset.
+            answered: whether the answer is there.
+            timeout_s, patience_s: longest wait in all, and for one answer, s.
+
+        Returns:
+            whether an answer came.
+        """
+        end = time.monotonic() + timeout_s
+        while True:
+            self.reset()
+            send()
+            if self.wait_for(answered, patience_s):
+                return True
+            if time.monotonic() >= end:
+                return False
