@@ -27,13 +27,13 @@ def keys_by_name(text: str) -> Iterator[tuple[str, set[str]]]:
 def test_parameters_are_those_of_the_nodes(repo_root: Path) -> None:
     """Whoever renames one is told."""
     from xb_muscle_ros.node.parameters import NODE_PARAMETERS, TEXTS
-    from xb_muscle_ros.plant.plant_parameters import parameters
+    from xb_muscle_ros.plant.plant_parameters import PLANT_PARAMETERS
 
     known = {
         "OF_MUSCLES": {*NODE_PARAMETERS, *TEXTS, "use_sim_time"},
         "PARAMETERS": {*NODE_PARAMETERS, *TEXTS, "use_sim_time"},
-        "OF_BOTH": ({*NODE_PARAMETERS} | {*TEXTS}) & {*parameters()},
-        "OF_THE_BODY": {*parameters()},
+        "OF_BOTH": ({*NODE_PARAMETERS} | {*TEXTS}) & {*PLANT_PARAMETERS},
+        "OF_THE_BODY": {*PLANT_PARAMETERS},
         "OF_THE_MUSCLES": {*NODE_PARAMETERS},
     }
     met = 0

@@ -157,7 +157,7 @@ def test_bad_parameters_end_with_code_2_and_one_line(stage: Stage, given: dict[s
 
 def test_arguments_that_are_not_of_ros_are_refused() -> None:
     """Both nodes; without --ros-args a parameter would be passed over."""
-    from xb_muscle_ros.node.arguments import begin
+    from xb_muscle_ros.node.program import begin
 
     for arguments in (["extra"], ["--", "x"]):
         with pytest.raises(UserError, match=f"argument '{arguments[0]}' is not known; ROS arguments come after"):

@@ -25,14 +25,13 @@ from xb_muscle_ros.node.graph import Namesakes, survive_wrong_transitions
 from xb_muscle_ros.node.inlet import Inlet
 from xb_muscle_ros.node.listening import Listening, overridable
 from xb_muscle_ros.node.lockstep import Lockstep
-from xb_muscle_ros.node.memory import lock_memory, unlock_memory
 from xb_muscle_ros.node.names import enumerated
 from xb_muscle_ros.node.outputs import OutputMessages
 from xb_muscle_ros.node.parameter_gate import ParameterGate
-from xb_muscle_ros.node.priority import drop_priority, take_priority
+from xb_muscle_ros.node.privileges import drop_priority, lock_memory, take_priority, unlock_memory
 from xb_muscle_ros.node.realtime import Realtime, Settings
 from xb_muscle_ros.node.reporter import Reporter
-from xb_muscle_ros.node.state_file import StateFile
+from xb_muscle_ros.node.saved_state import StateFile
 
 
 class MuscleNode(LifecycleNode):
@@ -239,7 +238,7 @@ class MuscleNode(LifecycleNode):
         if self._listening is not None:
             self._listening.reset()
         response.success = True
-        constants = _constants([*self._gate.fibres.values()])
+        constants = _constants(self._gate.fibres)
         response.message = f"state forgotten after {account}; the next length sample settles anew; {constants}"
         return response
 

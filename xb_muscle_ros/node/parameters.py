@@ -14,6 +14,7 @@ from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter
 
 from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.mechanisms.base import Parameter as Physical
 from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked
 from xb_muscle_ros.node.foreign_keys import GROUPS, of_a_fibre
 from xb_muscle_ros.node.watchdog import DECAY, HOLD, ISOMETRIC
@@ -126,11 +127,6 @@ def of_muscle_node(name: str) -> bool:
     return name in NODE_PARAMETERS or name in TEXTS or any(part in GROUPS for part in name.split(".")[:2])
 
 
-def check_node_parameter(name: str, value: object) -> Value:
-    """`check_value` for a parameter of the node."""
-    return check_value(name, NODE_PARAMETERS[name], value)
-
-
 def check_value(name: str, row: Row, value: object) -> Value:
     """Return a value of the row's type; whole numbers may stand for floating ones.
 
@@ -164,12 +160,16 @@ def check_fibre_parameter(name: str, value: object) -> float:
     Raises:
         UserError: the name is not known, or the value not allowed.
     """
+    key, table = _entry(name)
+    return checked(key, value, table, "parameters")
+
+
+def _entry(name: str) -> tuple[str, Mapping[str, Physical]]:
+    """A parameter of a fibre, or of one of many, by its name in one of the tables of all parameters, and the table."""
     head, _, rest = name.partition(".")
     if head not in GROUPS and rest:
         head, _, rest = rest.partition(".")
-    if head == "constants":
-        return checked(rest, value, CONSTANTS, "parameters")
-    return checked(rest.rpartition(".")[2], value, PARAMETERS, "parameters")
+    return (rest, CONSTANTS) if head == "constants" else (rest.rpartition(".")[2], PARAMETERS)
 
 
 def _texts(name: str, value: object) -> tuple[str, ...]:
@@ -216,11 +216,6 @@ def unknown(name: str, declared: Iterable[str]) -> UserError:
     return UserError(f"parameter '{name}' is not known{suggest(name, known)}")
 
 
-def node_descriptor(name: str) -> ParameterDescriptor:
-    """Descriptor of a parameter of the node."""
-    return row_descriptor(NODE_PARAMETERS[name])
-
-
 def row_descriptor(row: Row) -> ParameterDescriptor:
     """Descriptor of a parameter that a row describes."""
     unit = f" [{row.unit}]" if row.unit else ""
@@ -235,20 +230,20 @@ def row_descriptor(row: Row) -> ParameterDescriptor:
 
 
 def fibre_descriptor(name: str) -> ParameterDescriptor:
-    """Descriptor of a parameter of the fibre, such as ``models.3state_coop.f``, from the table of all parameters."""
+    """Descriptor of a parameter of a fibre, such as ``models.3state_coop.f``, from the table of all parameters.
+
+    Raises:
+        UserError: the name is not known.
+    """
     if is_text(name):
         meaning = TEXTS.get(name, "where the values of the set come from")
         return ParameterDescriptor(description=f"{meaning}; set {UNCONFIGURED}")
-    head, _, rest = name.partition(".")
-    if head not in GROUPS and rest:
-        # One of many fibres.
-        return fibre_descriptor(rest)
-    table, key = (CONSTANTS, rest) if head == "constants" else (PARAMETERS, rest.rpartition(".")[2])
-    when = f"set {UNCONFIGURED if key in OF_GRIDS else ALWAYS}"
-    if head == "constants":
-        when = "takes effect at the next reset"
+    key, table = _entry(name)
     if key not in table:
         raise UserError(f"parameter '{name}' is not known{suggest(key, table)}")
+    when = f"set {UNCONFIGURED if key in OF_GRIDS else ALWAYS}"
+    if table is CONSTANTS:
+        when = "takes effect at the next reset"
     row = table[key]
     return ParameterDescriptor(
         description=f"{row.meaning} [{row.unit}]; {when}; source: {row.source}",

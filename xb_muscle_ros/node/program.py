@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import sys
 from collections.abc import Callable, Sequence
@@ -48,8 +49,6 @@ def _code(name: str, usage: str, play: Callable[[list[str], Stop], None], argume
     try:
         try:
             from rclpy.utilities import try_shutdown
-
-            from xb_muscle_ros.node.arguments import begin
         except ImportError as error:
             remedy = "source a ROS 2 Jazzy, or run scripts/setup"
             raise UserError(f"ROS 2 cannot be imported ({error}); {remedy}") from error
@@ -70,11 +69,46 @@ def created(make: Callable[[], Any]) -> Any:
     Raises:
         UserError: it cannot be made.
     """
-    from xb_muscle_ros.node.arguments import first_words
-
     try:
         return make()
     except UserError:
         raise
     except Exception as error:
-        raise UserError(f"the node cannot be created: {first_words(error)}; check names and parameters") from error
+        raise UserError(f"the node cannot be created: {_first_words(error)}; check names and parameters") from error
+
+
+def begin(program: str, arguments: list[str]) -> None:
+    """Start ROS with a program's arguments; signals stay the program's own.
+
+    Raises:
+        UserError: an argument that is not ROS', or one that ROS cannot use.
+    """
+    import rclpy
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import remove_ros_args
+
+    try:
+        # The first entry stands for the program.
+        rest = remove_ros_args([program, *arguments])[1:]
+        if rest:
+            raise UserError(f"argument '{rest[0]}' is not known; ROS arguments come after --ros-args (see --help)")
+        rclpy.init(args=[program, *arguments], signal_handler_options=SignalHandlerOptions.NO)
+    except UserError:
+        raise
+    except Exception as error:
+        raise UserError(f"ROS arguments cannot be used: {_first_words(error)}{_hint(arguments, str(error))}") from error
+
+
+def _first_words(error: Exception) -> str:
+    """Text of an error of ROS without the places in ROS' own source."""
+    text = " ".join(str(error).split())
+    return text.split(", at ")[0]
+
+
+def _hint(arguments: list[str], error: str) -> str:
+    if "params file" in error:
+        return "; such a file has the node's full name or '/**' at its top, below it 'ros__parameters', then the names"
+    # ROS' grammar of -p has no names with a part that starts with a digit; parameter files have.
+    if any(re.match(r"[^:]*\.\d[^:]*:=", argument) for argument in arguments):
+        return "; a name such as models.3state_coop.f can be given in a parameter file only, not with -p"
+    return "; see --help"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -12,10 +13,10 @@ from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.node.names import enumerated, front
-from xb_muscle_ros.node.rules import LENGTH_CHANGE_L0, Counts, Scale, inside, scale_of
-from xb_muscle_ros.node.samples import Inputs, Samples
-from xb_muscle_ros.node.status import Account, Log, Snapshot, Status
+from xb_muscle_ros.node.names import front
+from xb_muscle_ros.node.rules import Counts, Scale, scale_of
+from xb_muscle_ros.node.samples import Samples
+from xb_muscle_ros.node.status import Account, Log, Snapshot, Status, no_state
 from xb_muscle_ros.node.stepping import Emit, Flags, Floats, outputs, step, stopped, use_threads
 from xb_muscle_ros.node.ticker import Ticker
 from xb_muscle_ros.node.watchdog import Watchdog, unfed
@@ -108,13 +109,9 @@ class Realtime:
         settings = self.settings
         period = round(1e9 / settings.rate_hz)
         self._dt = period * 1e-9
-        self._ticker.start(
-            period,
-            lambda: self.settings.max_catch_up,
-            settings.realtime_priority,
-            self._log,
-            lambda: use_threads(self.batch, settings.threads),
-        )
+        begin = functools.partial(use_threads, self.batch, settings.threads)
+        priority = settings.realtime_priority
+        self._ticker.start(period, lambda: self.settings.max_catch_up, priority, self._log, begin)
 
     def stop(self) -> None:
         """End the thread at its next tick, and wait for that."""
@@ -148,11 +145,9 @@ class Realtime:
         states, faults, inputs, scales = self._states, self._faults, self._samples.inputs, self._scale_out
         live = self._live & (inputs.run == self._run)
         for i in range(len(self._names)):
-            why = "" if live[i] else " yet: the fibre settles with the first length and calcium"
-            if i in faults:
-                why = f", stepping has stopped: {faults[i]}; call ~/reset first"
-            if why:
-                raise UserError(f"{front(self._names, [i], begin='fibre ')}there is no state to save{why}")
+            if i in faults or not live[i]:
+                why = no_state(faults.get(i, ""), "the first length and calcium")
+                raise UserError(f"{front(self._names, [i], begin='fibre ')}{why}")
         return tuple(
             Snapshot(
                 states[i], Scale(*scales[i].tolist()), ((0, float(inputs.calcium_um[i])),), None, None, Account(*taken)
@@ -197,7 +192,6 @@ class Realtime:
         if not waiting and not self._all_live and not faults:
             waiting.append("settling")
         overdue = np.flatnonzero(self._watchdog.overdue & live).tolist()
-        whose = "" if len(self._names) == 1 else f" ({enumerated([self._names[i] for i in overdue])})"
         ticker = self._ticker
         return Status(
             self._ticks,
@@ -207,7 +201,7 @@ class Realtime:
             ticker.lateness.summary(),
             ticker.overruns,
             ticker.dropped,
-            f"{self.settings.on_timeout}{whose}" if overdue else "",
+            f"{self.settings.on_timeout}{front(self._names, overdue, ')', ' (')}" if overdue else "",
             self._watchdog.timeouts,
         )
 
@@ -241,13 +235,12 @@ class Realtime:
         return stepping
 
     def _settle(self, i: int, change_l0: float, calcium_um: float) -> None:
+        states, live = self._states.copy(), self._live.copy()
         try:
-            state = self.muscles[i].settle(change_l0, calcium_um)
+            states[i], live[i] = self.muscles[i].settle(change_l0, calcium_um), True
         except UserError as error:
             self._fail(i, error)
             return
-        states, live = self._states.copy(), self._live.copy()
-        states[i], live[i] = state, True
         self._states = states
         self._use_live(live)
 
@@ -261,7 +254,7 @@ class Realtime:
                 return
         change, calcium = inputs.change_l0, inputs.calcium_um
         if settings.extrapolate:
-            change = _carried_on(inputs, deadline_ns, settings.extrapolation_limit_s)
+            change = inputs.carried_on(deadline_ns, settings.extrapolation_limit_s)
         watchdog, begun_ns = self._watchdog, self._ticker.begun_ns
         overdue_s = watchdog.look(inputs, begun_ns, deadline_ns, settings.timeout_s, settings.on_timeout, live)
         if overdue_s is not None:
@@ -305,11 +298,3 @@ class Realtime:
         live[i] = False
         self._use_live(live)
         self._log.error(f"{front(self._names, [i], ' ')}stopped: {text}; call ~/reset to start again")
-
-
-def _carried_on(inputs: Inputs, time_ns: int, limit_s: float) -> Floats:
-    """Length changes carried on by their velocities where there are any and they lead to what is allowed."""
-    ahead = np.minimum(np.maximum((time_ns - inputs.arrival_ns) * 1e-9, 0.0), limit_s)
-    change = inputs.change_l0 + inputs.velocity_l0_per_s * ahead
-    # Where the velocity would lead out of what is allowed, the sample itself is the better guess.
-    return np.where(inside(change, LENGTH_CHANGE_L0), change, inputs.change_l0)

@@ -25,7 +25,7 @@ from xb_muscle_ros.node.rules import (
     went_back,
 )
 from xb_muscle_ros.node.status import Account, Log, time_went_back
-from xb_muscle_ros.node.stepping import Flags, Floats
+from xb_muscle_ros.node.stepping import Floats
 
 Stamps = npt.NDArray[np.int64]
 
@@ -47,6 +47,13 @@ class Inputs(NamedTuple):
     oldest_ns: int
     scale: Floats
     run: Stamps
+
+    def carried_on(self, time_ns: int, limit_s: float) -> Floats:
+        """Length changes carried on by their velocities, where there are any and they lead to what is allowed."""
+        ahead = np.minimum(np.maximum((time_ns - self.arrival_ns) * 1e-9, 0.0), limit_s)
+        change = self.change_l0 + self.velocity_l0_per_s * ahead
+        # Where the velocity would lead out of what is allowed, the sample itself is the better guess.
+        return np.where(inside(change, LENGTH_CHANGE_L0), change, self.change_l0)
 
 
 class Samples:
@@ -91,7 +98,8 @@ class Samples:
             if self._simulated_time():
                 good |= went_back(stamp, last)
             if not good.all():
-                troubles = _out_of_order(stamp, last, fibres, good, "calcium")
+                for k in np.flatnonzero(~good).tolist():
+                    troubles.append(Trouble(int(fibres[k]), out_of_order(stamp, int(last[k]), "calcium")))
                 fibres, calcium_um = fibres[good], calcium_um[good]
             self._calcium_stamps[fibres] = stamp
         values = self.inputs.calcium_um.copy()
@@ -160,9 +168,3 @@ class Samples:
         self.counts["time went back"] += len(back)
         self._log.warning(front(self._names, back.tolist()) + time_went_back(last, stamp, taken))
         self.forget(back)
-
-
-def _out_of_order(stamp: int, last: Stamps, fibres: Indices, good: Flags, what: str) -> list[Trouble]:
-    """Troubles of the fibres whose stamps are not good."""
-    bad = np.flatnonzero(~good).tolist()
-    return [Trouble(int(fibres[k]), out_of_order(stamp, int(last[k]), what)) for k in bad]

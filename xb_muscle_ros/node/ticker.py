@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 
 from xb_muscle_ros.node.lateness import Lateness
-from xb_muscle_ros.node.priority import take_priority
+from xb_muscle_ros.node.privileges import take_priority
 from xb_muscle_ros.node.status import Log
 from xb_muscle_ros.node.waiting import make_waiter
 

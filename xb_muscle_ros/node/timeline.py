@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ from xb_muscle_ros.node.rules import (
     outside,
     went_back,
 )
-from xb_muscle_ros.node.status import Account, Snapshot
+from xb_muscle_ros.node.status import Account, Snapshot, no_state
 
 
 class Plan(NamedTuple):
@@ -113,10 +114,8 @@ class Timeline:
             UserError: there is no state yet, or integration failed.
         """
         run = self._run
-        if run.fault:
-            raise UserError(f"there is no state to save, stepping has stopped: {run.fault}; call ~/reset first")
-        if run.state is None:
-            raise UserError("there is no state to save yet: the fibre settles with the first length sample")
+        if run.fault or run.state is None:
+            raise no_state(run.fault, "the first length sample")
         return Snapshot(run.state, run.scale, run.calcium.kept(), run.stamp, run.asked, run.account())
 
     def load(self, snapshot: Snapshot) -> None:
@@ -232,25 +231,25 @@ def _after(stamp: int, last: int, what: str) -> int:
     return stamp
 
 
+@dataclass
 class _Run:
     """What a reset forgets."""
 
-    def __init__(self, scale: Scale) -> None:
-        self.scale = scale
-        self.state: npt.NDArray[np.float64] | None = None
-        # Stamp (ns) and length change (L0) of the last length sample, and until when calcium was asked for, ns.
-        self.stamp = NO_STAMP
-        self.change = 0.0
-        self.asked = NO_STAMP
-        self.calcium = CalciumHistory()
-        # Stamp of the last calcium sample of this run, ns; older ones may be left from before time went back.
-        self.calcium_stamp = NO_STAMP
-        # Calcium of a time that length has yet to go back to.
-        self.coming = CalciumHistory()
-        self.fault = ""
-        self.samples = 0
-        self.calcium_samples = 0
-        self.late = 0
+    scale: Scale
+    state: npt.NDArray[np.float64] | None = None
+    # Stamp (ns) and length change (L0) of the last length sample, and until when calcium was asked for, ns.
+    stamp: int = NO_STAMP
+    change: float = 0.0
+    asked: int = NO_STAMP
+    calcium: CalciumHistory = field(default_factory=CalciumHistory)
+    # Stamp of the last calcium sample of this run, ns; older ones may be left from before time went back.
+    calcium_stamp: int = NO_STAMP
+    # Calcium of a time that length has yet to go back to.
+    coming: CalciumHistory = field(default_factory=CalciumHistory)
+    fault: str = ""
+    samples: int = 0
+    calcium_samples: int = 0
+    late: int = 0
 
     def account(self) -> Account:
         """What was taken."""

@@ -37,7 +37,7 @@ class Body:
         self.fibre = without_parallel(fibre) if scene == "knee" else fibre
         torque = self.plant.constant("tone_nm") if scene == "knee" else self.plant.load_nm()
         drive = FibreDrive(self.plant, self.fibre, torque)
-        self.calcium_um = drive.activation
+        self.calcium_um = drive.calcium_um
         self._start_n = drive.pull()
         self._platform = platform if scene == "ankle" else None
         self._elastic = elastic

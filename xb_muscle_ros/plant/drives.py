@@ -24,8 +24,8 @@ _MOST_PCA, _LEAST_PCA = 4.0, 8.0
 class Drive(Protocol):
     """Muscles of one plant, constantly activated."""
 
-    activation: dict[str, float]
-    """What holds the start, by muscle: free calcium in µM, or activation from 0 to 1."""
+    driven_by: dict[str, dict[str, float]]
+    """What holds the start: of each muscle ``calcium_um``, µM, or ``activation``, 0 to 1."""
 
     def pull(self) -> Array:
         """Set the plant's forces for the coming tick; return pulls on the tendons at this moment, (muscle,), N."""
@@ -60,7 +60,8 @@ class FibreDrive:
         target = wanted / float(plant.tendon_force_n(np.ones_like(force))[0])
         self._calcium[0] = self._calcium_for(target, float(lengths[0]))
         self._states[0] = self._muscle.settle(float(lengths[0]), self._calcium[0])
-        self.activation = {m.name: c for m, c in zip(plant.muscles, self._calcium, strict=True)}
+        self.calcium_um = {m.name: c for m, c in zip(plant.muscles, self._calcium, strict=True)}
+        self.driven_by = {"calcium_um": self.calcium_um}
         self._fibre_l0 = [float(length) for length in lengths]
         self._tendons = [
             tendon_at(self._muscle.outputs(state).force_f0 * math.cos(m.pennation_rad), m.tendon_slack_m)
@@ -163,7 +164,7 @@ class OwnDrive:
                 f"it needs activation {activation[0]:.4g}; allowed is 0 to 1; leave model 'mujoco' out"
             )
         plant.activate(activation)
-        self.activation = {m.name: float(a) for m, a in zip(plant.muscles, activation, strict=True)}
+        self.driven_by = {"activation": {m.name: float(a) for m, a in zip(plant.muscles, activation, strict=True)}}
 
     def pull(self) -> Array:
         """Nothing to set: MuJoCo computes the force within its step, with the velocity of the moment."""

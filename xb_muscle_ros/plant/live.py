@@ -44,13 +44,14 @@ class LiveDrive:
         """
         self._plant = plant
         self._tick = 0
-        self.activation = FibreDrive(plant, fibre, torque_nm).activation
+        calcium_um = FibreDrive(plant, fibre, torque_nm).calcium_um
+        self.driven_by = {"calcium_um": calcium_um}
         self._link = Link("plant", namespace, domain_id)
         try:
             self._end = MuscleEnd(self._link, plant.muscles, fibre, "lockstep")
             self._end.find()
             path = plant.length_change_l0()
-            self._force = self._end.settle(path, self.activation)
+            self._force = self._end.settle(path, calcium_um)
             self._junction = Junction(plant.muscles, path, self._force) if elastic else None
         except BaseException:
             self.close()

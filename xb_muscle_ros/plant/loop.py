@@ -38,7 +38,7 @@ class Trace:
         scene, model: names; the model's is that of a parameter set, or ``mujoco``.
         fibre: name, empty for ``mujoco``.
         moved_before: the leg was moved before it was released.
-        activation: of each muscle, constant; µM of calcium, or 0 to 1 for ``mujoco``.
+        driven_by: constant, of each muscle: ``calcium_um``, µM, or for ``mujoco`` ``activation``, 0 to 1.
         muscles: names, in the order of the columns below.
         time_s: shape (n,), from release or from the platform's first motion.
         angle_rad: shape (n,).
@@ -54,7 +54,7 @@ class Trace:
     model: str
     fibre: str
     moved_before: bool
-    activation: dict[str, float]
+    driven_by: dict[str, dict[str, float]]
     muscles: tuple[str, ...]
     time_s: Array
     angle_rad: Array
@@ -158,7 +158,7 @@ def _couple(
         model=OWN if fibre is None else fibre.model,
         fibre="" if fibre is None else fibre.name,
         moved_before=moved_before,
-        activation=drive.activation,
+        driven_by=drive.driven_by,
         muscles=tuple(m.name for m in plant.muscles),
         time_s=time,
         angle_rad=angle,

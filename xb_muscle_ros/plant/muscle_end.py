@@ -79,13 +79,7 @@ class MuscleEnd:
         link, fibre = self._link, self._fibre
         link.find(timeout_s, self.command)
         wanted: dict[str, object] = {"mode": self._mode, "model": fibre.model, "method": fibre.method}
-        found = link.parameters([*wanted, *(f"{name}.constants.f0_n" for name in self._names)])
-        for name, value in wanted.items():
-            if found.get(name) != value:
-                raise UserError(
-                    f"node {link.peer} has {name} = {found.get(name, 'none')}, needed is {value}; end the node and "
-                    f"start another: {self.command}"
-                )
+        found = link.check(wanted, self.command, [f"{name}.constants.f0_n" for name in self._names])
         missing = [name for name in self._names if f"{name}.constants.f0_n" not in found]
         if missing:
             raise UserError(

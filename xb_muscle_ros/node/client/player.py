@@ -79,19 +79,14 @@ def _check(link: Link, trials: Sequence[Trial], fibre: Fibre | None, command: st
     wanted: dict[str, object] = {"mode": "lockstep"}
     if fibre is not None:
         wanted |= {n: v for n, v in flat(fibre).items() if not n.startswith(("source", "constants."))}
-    found = link.parameters(["fibre", *wanted])
+    fibre_there = link.parameters(["fibre"])["fibre"]
     for trial in trials:
-        if trial.facts.fibre != found["fibre"]:
+        if trial.facts.fibre != fibre_there:
             raise UserError(
-                f"node {link.peer} has fibre {found['fibre']}, trial {trial.facts.trial} is of fibre "
+                f"node {link.peer} has fibre {fibre_there}, trial {trial.facts.trial} is of fibre "
                 f"{trial.facts.fibre}; end the node and start another: {command}"
             )
-    for name, value in wanted.items():
-        if found.get(name) != value:
-            raise UserError(
-                f"node {link.peer} has {name} = {found.get(name, 'none')}, needed is {value}; end the node and start "
-                f"another: {command}"
-            )
+    link.check(wanted, command)
 
 
 class _Player:
