@@ -103,6 +103,9 @@ def start(domain: int, request: pytest.FixtureRequest) -> Iterator[Callable[...,
 
     yield make
     for driver in drivers:
+        # All end side by side.
+        driver.process.ask_to_stop()
+    for driver in drivers:
         driver.link.close()
         driver.process.stop()
 

@@ -133,7 +133,7 @@ def test_violation_stops_the_output_until_reset(make: Callable[..., Bench], musc
     bench.realtime.take_length(0, 1.2, None)
     bench.until(lambda: bench.notes.lines)
     count = len(bench.emitted)
-    time.sleep(0.05)
+    bench.rounds(25)
     assert len(bench.emitted) == count
     assert len(bench.notes.lines) == 1
     assert bench.notes.lines[0].startswith("error stopped: fibre 18Dec2017a: state q2")

@@ -183,7 +183,7 @@ def _damaged(path: Path, how: str) -> NoReturn:
 class StateFile:
     """Saves and loads what a node steps."""
 
-    def __init__(self, mode: str, name: Callable[[], str], stepping: Callable[[], Any], log: Log) -> None:
+    def __init__(self, mode: str, name: Callable[[], str], stepping: Callable[[], Stepping | None], log: Log) -> None:
         """Know the mode of the node, and whom to ask for the file's name and what is stepped (None: nothing)."""
         self._mode = mode
         self._name = name
@@ -192,11 +192,11 @@ class StateFile:
 
     def on_save(self, request: Any, response: Any) -> Any:
         """Callback of ``~/save_state``."""
-        return self._answer(response, self._save)
+        return self._answer(response, save_state)
 
     def on_load(self, request: Any, response: Any) -> Any:
         """Callback of ``~/load_state``."""
-        return self._answer(response, self._load)
+        return self._answer(response, load_state)
 
     def load_at_start(self) -> None:
         """Go on with the file where there is one; a line says what is done.
@@ -210,23 +210,17 @@ class StateFile:
         if not Path(name).expanduser().exists():
             self._log.warning(f"state file {name} does not exist yet: the fibre settles anew with its first samples")
             return
-        self._log.info(self._load())
+        self._log.info(self._done(load_state))
 
-    def _save(self) -> str:
-        return save_state(self._name(), self._mode, self._known())
-
-    def _load(self) -> str:
-        return load_state(self._name(), self._mode, self._known())
-
-    def _known(self) -> Any:
+    def _done(self, act: Callable[[str, str, Stepping], str]) -> str:
         stepping = self._stepping()
         if stepping is None:
             raise UserError("the node is not configured; configure it first")
-        return stepping
+        return act(self._name(), self._mode, stepping)
 
-    def _answer(self, response: Any, act: Callable[[], str]) -> Any:
+    def _answer(self, response: Any, act: Callable[[str, str, Stepping], str]) -> Any:
         try:
-            response.message = act()
+            response.message = self._done(act)
             response.success = True
             self._log.info(response.message)
         except UserError as error:

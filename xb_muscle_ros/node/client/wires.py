@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 from sensor_msgs.msg import JointState
 
@@ -37,5 +36,6 @@ class Sender:
         """Publish values of the fibres, shape (fibres,), or one for all, and velocities where there are any."""
         set_stamp(self._message, stamp_ns)
         self._position[:] = values
-        self._message.velocity = [] if velocity is None else np.asarray(velocity).tolist()
+        if velocity is not None or self._message.velocity:
+            self._message.velocity = [] if velocity is None else velocity.tolist()
         self.publisher.publish(self._message)
