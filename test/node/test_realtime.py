@@ -34,7 +34,7 @@ class Bench(Waiting):
 
     def state(self) -> dict[str, float]:
         """The newest state by name."""
-        return dict(zip(self.realtime.muscles[0].state_names, self.realtime._states[0].tolist(), strict=True))
+        return dict(zip(self.realtime.batch.muscles[0].state_names, self.realtime._states[0].tolist(), strict=True))
 
 
 @pytest.fixture

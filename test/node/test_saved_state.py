@@ -6,6 +6,7 @@ import dataclasses
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ class Keeps:
     """Something with a state, and nothing that moves it."""
 
     def __init__(self, muscle: Muscle, snapshot: Snapshot | None = None) -> None:
-        self.muscles = [muscle]
+        self.batch: Any = SimpleNamespace(muscles=[muscle])
         self.snapshot = snapshot
 
     def save(self) -> Sequence[Snapshot]:

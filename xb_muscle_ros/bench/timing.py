@@ -20,7 +20,7 @@ from xb_muscle_ros.node.client.link import Link
 from xb_muscle_ros.node.client.process import NodeProcess, private_domain
 from xb_muscle_ros.node.client.wires import Sender, reliable
 from xb_muscle_ros.node.rules import stamp_ns
-from xb_muscle_ros.node.waiting import make_waiter
+from xb_muscle_ros.node.ticker import make_waiter
 
 _INPUT_HZ = 500.0
 PLAIN = "xb_muscle_ros.bench.plain_timer"

@@ -56,7 +56,6 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.plant.figure import draw_loop
     from xb_muscle_ros.plant.loop import DURATION_S, Muscles, in_process, run_ankle, run_knee
     from xb_muscle_ros.plant.plant import Plant
-    from xb_muscle_ros.plant.reach import beyond_in
     from xb_muscle_ros.plant.report import table, write
     from xb_muscle_ros.plant.translation import RampAndHold
 
@@ -101,7 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
         traces = [run_knee(fibre, moved, duration, elastic, muscles) for moved in (False, True) for fibre in fibres]
         title = "Leg released from level"
     for trace in traces:
-        if said := beyond_in(trace):
+        if said := trace.beyond:
             warn(said)
     print(table(traces))
     draw_loop(arguments.out / "loop.png", traces, f"{title}; {settings['tendon']} tendons")

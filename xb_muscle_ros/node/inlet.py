@@ -48,6 +48,7 @@ class Inlet:
     """
 
     def __init__(self, fibres: Sequence[str], taker: Stepping, logger: Any) -> None:
+        """Be closed at first; `fibres` are names."""
         self.open = False
         self.refused = Counts()
         self.ignored_names = 0

@@ -10,7 +10,6 @@ import numpy as np
 from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.node.names import Indices, front
 from xb_muscle_ros.node.rules import Counts, Refusal, Trouble, scale_of
 from xb_muscle_ros.node.status import Account, Log, Snapshot, Status, time_went_back
@@ -56,11 +55,6 @@ class Lockstep:
             for i, muscle in enumerate(batch.muscles)
         ]
         self._use_scales()
-
-    @property
-    def muscles(self) -> tuple[Muscle, ...]:
-        """One for each fibre, in order."""
-        return self.batch.muscles
 
     def start(self) -> None:
         """Samples drive it; only the number of threads is set, for the thread that calls."""
@@ -138,8 +132,8 @@ class Lockstep:
 
     def status(self) -> Status:
         """How it goes, over all fibres."""
-        waiting = [i for i, timeline in enumerate(self._timelines) if not timeline.settled]
-        faults = {i: timeline.fault for i, timeline in enumerate(self._timelines) if timeline.fault}
+        waiting = [i for i, timeline in enumerate(self._timelines) if timeline.run.state is None]
+        faults = {i: timeline.run.fault for i, timeline in enumerate(self._timelines) if timeline.run.fault}
         what = f"{front(self._names, waiting)}waiting for the first length sample and its calcium"
         return Status(self._answers, self._violations, stopped(self._names, faults), what if waiting else "")
 
@@ -156,7 +150,7 @@ class Lockstep:
         for i, plan in plans:
             timeline = self._timelines[i]
             try:
-                states.append(plan.step(self.muscles[i]))
+                states.append(plan.step(self.batch.muscles[i]))
             except UserError as error:
                 self._violations += isinstance(error, StateViolation)
                 troubles.append(Trouble(i, timeline.failed(plan, error)))
@@ -183,7 +177,7 @@ class Lockstep:
         self._back.append((i, last, taken))
 
     def _use_scales(self) -> None:
-        self._scales = np.array([timeline.scale for timeline in self._timelines])
+        self._scales = np.array([timeline.run.scale for timeline in self._timelines])
 
 
 def _total(accounts: Iterable[Account]) -> Account:

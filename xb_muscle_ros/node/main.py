@@ -23,7 +23,6 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 def _play(arguments: list[str], stop: program.Stop) -> None:
-    from xb_muscle_ros.node.executor import make_executor
     from xb_muscle_ros.node.muscle_node import MuscleNode
     from xb_muscle_ros.node.parameter_files import silent_files
 
@@ -32,7 +31,7 @@ def _play(arguments: list[str], stop: program.Stop) -> None:
         node.autostart()
         for line in silent_files(arguments, node.get_fully_qualified_name()):
             node.get_logger().warning(line)
-        executor = make_executor()
+        executor = program.make_executor()
         executor.add_node(node)
         while not stop() and not node.finished:
             executor.spin_once(timeout_sec=0.1)

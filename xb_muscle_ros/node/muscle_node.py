@@ -58,7 +58,7 @@ class MuscleNode(LifecycleNode):
         self._listening: Listening | None = None
         # While the program starts the node, the caller tells what is wrong.
         self._starting = False
-        self._entities: list[tuple[Any, Any]] = []
+        self._outlets: list[Any] = []
         self._reporter = Reporter(self, self._mode)
         self.create_service(Trigger, "~/reset", self._on_reset)
         self._state_file = StateFile(
@@ -155,12 +155,12 @@ class MuscleNode(LifecycleNode):
         return super().on_error(state)
 
     def _connect(self, fibres: Sequence[Fibre]) -> None:
-        force, moments = (
-            self._outlet(self.create_lifecycle_publisher(JointState, topic, _output_qos(), **overridable()))
-            for topic in ("muscle/force", "muscle/moments")
-        )
+        self._outlets = [
+            self.create_lifecycle_publisher(JointState, f"muscle/{topic}", _output_qos(), **overridable())
+            for topic in ("force", "moments")
+        ]
         names = [fibre.name for fibre in fibres]
-        outlet = OutputMessages(names, force, moments)
+        outlet = OutputMessages(names, *self._outlets)
         self._stepping = stepping = self._made(fibres, outlet)
         self._inlet = inlet = Inlet(names, stepping, self.get_logger())
         self._listening = Listening(self, inlet, self._mode)
@@ -177,10 +177,6 @@ class MuscleNode(LifecycleNode):
 
     def _now_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
-
-    def _outlet(self, publisher: Any) -> Any:
-        self._entities.append((publisher, self.destroy_lifecycle_publisher))
-        return publisher
 
     def _set_active(self, active: bool) -> None:
         self._gate.active = active
@@ -199,9 +195,9 @@ class MuscleNode(LifecycleNode):
     def _free(self) -> None:
         if self._listening is not None:
             self._listening.close()
-        for entity, destroy in self._entities:
-            destroy(entity)
-        self._entities.clear()
+        for publisher in self._outlets:
+            self.destroy_lifecycle_publisher(publisher)
+        self._outlets.clear()
         self._reporter.forget()
         self._stepping = None
         self._inlet = self._listening = None

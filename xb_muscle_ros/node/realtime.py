@@ -12,7 +12,6 @@ import numpy as np
 from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.node.names import front
 from xb_muscle_ros.node.rules import Counts, Scale, scale_of
 from xb_muscle_ros.node.samples import Samples
@@ -98,11 +97,6 @@ class Realtime:
     def counts(self) -> Counts:
         """What was odd about the input that was taken nevertheless."""
         return self._samples.counts
-
-    @property
-    def muscles(self) -> tuple[Muscle, ...]:
-        """One for each fibre, in order."""
-        return self.batch.muscles
 
     def start(self) -> None:
         """Start the thread."""
@@ -237,7 +231,7 @@ class Realtime:
     def _settle(self, i: int, change_l0: float, calcium_um: float) -> None:
         states, live = self._states.copy(), self._live.copy()
         try:
-            states[i], live[i] = self.muscles[i].settle(change_l0, calcium_um), True
+            states[i], live[i] = self.batch.muscles[i].settle(change_l0, calcium_um), True
         except UserError as error:
             self._fail(i, error)
             return
@@ -272,7 +266,7 @@ class Realtime:
         stepped = states.copy()
         for i in np.flatnonzero(live).tolist():
             try:
-                stepped[i] = self.muscles[i].step(states[i], float(change[i]), float(calcium[i]), self._dt)
+                stepped[i] = self.batch.muscles[i].step(states[i], float(change[i]), float(calcium[i]), self._dt)
             except UserError as error:
                 stepped[i] = self._rest[i]
                 self._fail(i, error)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
@@ -44,13 +44,6 @@ class Trouble(NamedTuple):
     error: Refusal | UserError
 
 
-class Stamp(Protocol):
-    """builtin_interfaces/Time."""
-
-    sec: int
-    nanosec: int
-
-
 class Scale(NamedTuple):
     """What one L0 and one F0 are; both are constants of a fibre."""
 
@@ -63,8 +56,8 @@ def scale_of(fibre: Fibre) -> Scale:
     return Scale(fibre.reference_length_m, fibre.f0_n)
 
 
-def stamp_ns(stamp: Stamp) -> int:
-    """Time of a message in ns."""
+def stamp_ns(stamp: Any) -> int:
+    """Time in ns of a builtin_interfaces/Time."""
     return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 

@@ -112,8 +112,7 @@ class Samples:
         self, stamp: int, fibres: Indices, position_m: Floats, velocity_m_per_s: Floats | None
     ) -> list[Trouble]:
         """Use lengths (m, m/s or None) of some fibres from the next tick on; see `take_calcium`."""
-        last, back = self._length_stamps[fibres], None
-        old = self.inputs
+        old, last, back = self.inputs, self._length_stamps[fibres], None
         reference = old.scale[fibres, 0]
         if stamp != 0 and self._simulated_time():
             back = went_back(stamp, last)

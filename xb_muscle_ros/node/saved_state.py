@@ -13,6 +13,7 @@ import numpy as np
 from xb_muscle_ros import __version__
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import write_text
+from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.node.rules import Scale
 from xb_muscle_ros.node.status import Account, Log, Snapshot
@@ -24,9 +25,7 @@ FORMATS = ("xb_muscle_ros state 1", "xb_muscle_ros states 1")
 class Stepping(Protocol):
     """What both modes can do."""
 
-    @property
-    def muscles(self) -> Sequence[Muscle]:
-        """One for each fibre."""
+    batch: MuscleBatch
 
     def save(self) -> Sequence[Snapshot]:
         """What is needed to go on, for each fibre."""
@@ -49,7 +48,7 @@ def save_state(state_file: str, mode: str, stepping: Stepping) -> str:
         UserError: no path, nothing to save, or the file cannot be written.
     """
     path = _path(state_file)
-    muscles, snapshots = stepping.muscles, stepping.save()
+    muscles, snapshots = stepping.batch.muscles, stepping.save()
     trees = [_tree(muscle, mode, snapshot) for muscle, snapshot in zip(muscles, snapshots, strict=True)]
     alone = len(trees) == 1
     tree = {"format": FORMATS[not alone], "version": __version__, **(trees[0] if alone else {"fibres": trees})}
@@ -73,7 +72,7 @@ def load_state(state_file: str, mode: str, stepping: Stepping) -> str:
             parameter values (the bounds of a strain grid are among them).
     """
     path = _path(state_file)
-    muscles = stepping.muscles
+    muscles = stepping.batch.muscles
     tree = _read(path)
     trees = [tree] if tree["format"] == FORMATS[0] else tree.get("fibres")
     if not isinstance(trees, list) or not all(isinstance(entry, dict) for entry in trees):

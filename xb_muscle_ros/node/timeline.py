@@ -58,6 +58,36 @@ class Plan(NamedTuple):
         return muscle.step(self.state, self.change_l0, self.calcium_um, self.dt_s)
 
 
+@dataclass
+class Run:
+    """What a reset forgets.
+
+    Attributes:
+        scale: in use.
+        fault: why it stopped; empty where it did not.
+    """
+
+    scale: Scale
+    state: npt.NDArray[np.float64] | None = None
+    # Stamp (ns) and length change (L0) of the last length sample, and until when calcium was asked for, ns.
+    stamp: int = NO_STAMP
+    change: float = 0.0
+    asked: int = NO_STAMP
+    calcium: CalciumHistory = field(default_factory=CalciumHistory)
+    # Stamp of the last calcium sample of this run, ns; older ones may be left from before time went back.
+    calcium_stamp: int = NO_STAMP
+    # Calcium of a time that length has yet to go back to.
+    coming: CalciumHistory = field(default_factory=CalciumHistory)
+    fault: str = ""
+    samples: int = 0
+    calcium_samples: int = 0
+    late: int = 0
+
+    def account(self) -> Account:
+        """What was taken."""
+        return Account(self.samples, self.calcium_samples, self.late)
+
+
 class Timeline:
     """What one fibre has taken and what may come next; the stepping itself is left to others.
 
@@ -67,6 +97,7 @@ class Timeline:
     Where time is simulated, a length sample whose stamp went back (see `went_back`) resets and settles anew.
 
     Attributes:
+        run: since the last reset.
         next_scale: becomes the scale in use at the next reset.
     """
 
@@ -85,26 +116,11 @@ class Timeline:
         self._counts = counts
         self._simulated_time = simulated_time
         self._on_back = on_back
-        self._run = _Run(scale)
-
-    @property
-    def scale(self) -> Scale:
-        """The scale in use."""
-        return self._run.scale
-
-    @property
-    def settled(self) -> bool:
-        """Whether there is a state."""
-        return self._run.state is not None
-
-    @property
-    def fault(self) -> str:
-        """Why it stopped; empty where it did not."""
-        return self._run.fault
+        self.run = Run(scale)
 
     def reset(self) -> Account:
         """Forget state, stamps and calcium; the next length sample settles anew. Returns what was taken until now."""
-        run, self._run = self._run, _Run(self.next_scale)
+        run, self.run = self.run, Run(self.next_scale)
         return run.account()
 
     def save(self) -> Snapshot:
@@ -113,14 +129,14 @@ class Timeline:
         Raises:
             UserError: there is no state yet, or integration failed.
         """
-        run = self._run
+        run = self.run
         if run.fault or run.state is None:
             raise no_state(run.fault, "the first length sample")
         return Snapshot(run.state, run.scale, run.calcium.kept(), run.stamp, run.asked, run.account())
 
     def load(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot: the next length sample is the one after its last; all taken since is forgotten."""
-        run = self._run = _Run(snapshot.scale)
+        run = self.run = Run(snapshot.scale)
         run.state = snapshot.state
         run.change = float(snapshot.state[-3])
         assert snapshot.stamp is not None
@@ -137,7 +153,7 @@ class Timeline:
         Raises:
             Refusal: the stamp is not after the last one.
         """
-        run, last = self._run, self._run.calcium_stamp
+        run, last = self.run, self.run.calcium_stamp
         if stamp <= last and self._simulated_time():
             if went_back(stamp, run.stamp):
                 self._keep_for_later(stamp, calcium_um)
@@ -160,16 +176,16 @@ class Timeline:
         Raises:
             Refusal: the sample cannot be integrated.
         """
-        back = went_back(stamp, self._run.stamp) and self._simulated_time()
-        if self._run.fault and not back:
+        back = went_back(stamp, self.run.stamp) and self._simulated_time()
+        if self.run.fault and not back:
             raise Refusal("stopped", "integration failed before; call ~/reset to start again")
-        reference = (self.next_scale if back else self._run.scale).reference_length_m
+        reference = (self.next_scale if back else self.run.scale).reference_length_m
         change = length_change_l0(position_m, reference)
         if not inside(change, LENGTH_CHANGE_L0):
             raise impossible_length(position_m, reference)
         if back:
             self._begin_again(stamp)
-        run = self._run
+        run = self.run
         last = run.stamp
         stamp = _after(stamp, last, "length")
         asked = stamp if last == NO_STAMP else last
@@ -189,26 +205,26 @@ class Timeline:
 
     def commit(self, plan: Plan, state: npt.NDArray[np.float64]) -> None:
         """Take a plan's result up."""
-        run = self._run
+        run = self.run
         run.state, run.stamp, run.change, run.asked = state, plan.stamp, plan.change_l0, plan.asked
         run.samples += 1
 
     def failed(self, plan: Plan, error: UserError) -> UserError:
         """Stop until the next reset, because a plan could not be integrated; returns what to say."""
-        self._run.fault = f"{error} (in the step from {plan.asked * 1e-9:.9f} s to {plan.stamp * 1e-9:.9f} s)"
-        return UserError(self._run.fault)
+        self.run.fault = f"{error} (in the step from {plan.asked * 1e-9:.9f} s to {plan.stamp * 1e-9:.9f} s)"
+        return UserError(self.run.fault)
 
     def _keep_for_later(self, stamp: int, calcium_um: float) -> None:
         """Calcium that came before the length that takes time back waits for it."""
-        coming = self._run.coming
+        coming = self.run.coming
         last = coming.last_stamp
         coming.add(_after(stamp, NO_STAMP if went_back(stamp, last) else last, "calcium"), calcium_um)
         self._counts["calcium before its length went back"] += 1
 
     def _begin_again(self, stamp: int) -> None:
-        old = self._run
+        old = self.run
         account = self.reset()
-        run = self._run
+        run = self.run
         # Calcium from before that time still holds, unless newer has come for it.
         run.calcium = old.calcium
         run.calcium.cut(stamp + 1)
@@ -229,28 +245,3 @@ def _after(stamp: int, last: int, what: str) -> int:
     if not follows(stamp, last):
         raise out_of_order(stamp, last, what)
     return stamp
-
-
-@dataclass
-class _Run:
-    """What a reset forgets."""
-
-    scale: Scale
-    state: npt.NDArray[np.float64] | None = None
-    # Stamp (ns) and length change (L0) of the last length sample, and until when calcium was asked for, ns.
-    stamp: int = NO_STAMP
-    change: float = 0.0
-    asked: int = NO_STAMP
-    calcium: CalciumHistory = field(default_factory=CalciumHistory)
-    # Stamp of the last calcium sample of this run, ns; older ones may be left from before time went back.
-    calcium_stamp: int = NO_STAMP
-    # Calcium of a time that length has yet to go back to.
-    coming: CalciumHistory = field(default_factory=CalciumHistory)
-    fault: str = ""
-    samples: int = 0
-    calcium_samples: int = 0
-    late: int = 0
-
-    def account(self) -> Account:
-        """What was taken."""
-        return Account(self.samples, self.calcium_samples, self.late)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.plant.drives import FibreDrive, without_parallel
+from xb_muscle_ros.plant.drives import FibreDrive, beyond, without_parallel
 from xb_muscle_ros.plant.junction import Junction
 from xb_muscle_ros.plant.plant import Array, Plant
-from xb_muscle_ros.plant.reach import beyond
 from xb_muscle_ros.plant.translation import RampAndHold
 
 

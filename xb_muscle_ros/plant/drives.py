@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre, changed
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.node.rules import LENGTH_CHANGE_L0
 from xb_muscle_ros.plant.plant import Array, Plant
 from xb_muscle_ros.plant.tendon import tendon_at
 
@@ -195,3 +196,17 @@ def without_parallel(fibre: Fibre) -> Fibre:
 def pca(calcium_um: float) -> float:
     """-log10 of free calcium in mol/L."""
     return 6.0 - math.log10(calcium_um)
+
+
+def beyond(muscles: Sequence[str], length_l0: Array) -> str:
+    """Which muscle is longer or shorter than a fibre works; empty where none is.
+
+    Args:
+        muscles: names.
+        length_l0: length changes of their fibres, shape (muscle,).
+    """
+    least, most = LENGTH_CHANGE_L0
+    for name, change in zip(muscles, length_l0.tolist(), strict=True):
+        if not least <= change <= most:
+            return f"the fibre of {name} comes to {1.0 + change:.3f} L0, beyond {1.0 + least:g} to {1.0 + most:g} L0"
+    return ""

@@ -7,12 +7,11 @@ from contextlib import closing
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.node.client.link import Link
-from xb_muscle_ros.plant.drives import FibreDrive
+from xb_muscle_ros.plant.drives import FibreDrive, beyond
 from xb_muscle_ros.plant.junction import Junction
 from xb_muscle_ros.plant.loop import Muscles
 from xb_muscle_ros.plant.muscle_end import MuscleEnd
 from xb_muscle_ros.plant.plant import Array, Plant
-from xb_muscle_ros.plant.reach import beyond
 
 _ANSWER_S = 10.0
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.plant.drives import OWN, Drive, FibreDrive, OwnDrive, without_parallel
+from xb_muscle_ros.node.rules import LENGTH_CHANGE_L0
+from xb_muscle_ros.plant.drives import OWN, Drive, FibreDrive, OwnDrive, beyond, without_parallel
 from xb_muscle_ros.plant.plant import Array, Plant
 from xb_muscle_ros.plant.translation import RampAndHold
 
@@ -68,6 +69,19 @@ class Trace:
     def label(self) -> str:
         """Model, and whether it was moved before."""
         return f"{self.model}, moved before" if self.moved_before else self.model
+
+    @property
+    def beyond(self) -> str:
+        """Which muscle's fibre was first beyond the lengths that a fibre has, and when; empty where none was."""
+        least, most = LENGTH_CHANGE_L0
+        outside = ~np.all((self.length_change_l0 >= least) & (self.length_change_l0 <= most), axis=1)
+        if not outside.any():
+            return ""
+        k = int(np.argmax(outside))
+        return (
+            f"{self.label}: {beyond(self.muscles, self.length_change_l0[k])}, from t = {self.time_s[k]:.3f} s on; "
+            "what comes after that is no muscle's answer, so take a shorter --duration or a smaller --displacement"
+        )
 
 
 def run_ankle(

@@ -95,10 +95,9 @@ def _augmented_in_realtime(timing: Timing) -> None:
 
 def _import(files: list[Path], folder: Path) -> list[Path]:
     mapping = build_mapping(load_mapping(_MAPPING), f"mapping {_MAPPING}")
-    bags = []
-    for file in files:
-        bags.append(folder / file.stem)
-        write_trial(bags[-1], read_csv(file, mapping))
+    bags = [folder / file.stem for file in files]
+    for bag, file in zip(bags, files, strict=True):
+        write_trial(bag, read_csv(file, mapping))
     return bags
 
 

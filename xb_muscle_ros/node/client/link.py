@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.node.executor import make_executor
+from xb_muscle_ros.node.program import make_executor
 from xb_muscle_ros.node.status import Account
 
 _ANSWER_S = 10.0
