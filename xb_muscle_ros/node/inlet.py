@@ -119,13 +119,15 @@ class Inlet:
                 self.ignored_names += len(places.new)
                 here = f"fibre{'s' if len(self._fibres) > 1 else ''} {enumerated(self._fibres)}"
                 self._logger.warning(f"names ignored: {enumerated(places.new)}; this node has {here}")
+            if not places.fibres.size:
+                return None
             if topic == "length" and message.velocity and len(message.velocity) != len(message.position):
                 told = f"{len(message.velocity)} velocities for {len(message.position)} positions"
                 raise Refusal("wrong array size", told)
         except Refusal as refusal:
             self._refuse(topic, refusal, [])
             return None
-        return places if places.fibres.size else None
+        return places
 
     def _tell(self, topic: str, fibres: Indices, troubles: Sequence[Trouble], told: Sequence[Trouble]) -> None:
         """Count and say what is wrong, each reason once for all fibres that have it; the others are well again."""

@@ -135,9 +135,10 @@ class Realtime:
         Raises:
             UserError: a fibre has no state yet, or has stopped.
         """
-        # Each is read once: the thread steps on meanwhile.
-        states, faults, inputs, scales = self._states, self._faults, self._samples.inputs, self._scale_out
-        live = self._live & (inputs.run == self._run)
+        # The thread goes on meanwhile: it takes resets up in the reverse order, and a state is there before it is live.
+        run, live, states = self._run, self._live, self._states
+        faults, inputs, scales = self._faults, self._samples.inputs, self._scale_out
+        live = live & (inputs.run == run)
         for i in range(len(self._names)):
             if i in faults or not live[i]:
                 why = no_state(faults.get(i, ""), "the first length and calcium")
@@ -207,14 +208,14 @@ class Realtime:
         """Fibres that were reset are at rest from now on."""
         inputs = self._samples.inputs
         anew = inputs.run != self._run
-        self._run = inputs.run
+        self._use_live(self._live & ~anew)
         self._states = np.where(anew[:, None], self._rest, self._states)
         self._scale_out = np.where(anew[:, None], inputs.scale, self._scale_out)
         self._faults = {i: fault for i, fault in self._faults.items() if not anew[i]}
-        self._use_live(self._live & ~anew)
         self._watchdog.forget(anew)
         if anew.all():
             self._ticker.forget()
+        self._run = inputs.run
 
     def _ready(self) -> bool:
         if self._samples.inputs.run is not self._run:
