@@ -11,15 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 from rclpy.duration import Duration
-from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.node.client.link import Link
+from xb_muscle_ros.node.client.wires import Sender, reliable
 from xb_muscle_ros.node.configuration import flat
-from xb_muscle_ros.node.inputs import stamp_ns
-from xb_muscle_ros.node.link import Link
-from xb_muscle_ros.node.outputs import room
+from xb_muscle_ros.node.rules import stamp_ns
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
 from xb_muscle_ros.trials.stamps import to_ns
 from xb_muscle_ros.trials.trial import Trial
@@ -66,7 +65,7 @@ def play_live(
         model = f" -p model:={fibre.model}" if fibre is not None else ""
         given = str(fibre.path) if fibre is not None and fibre.path is not None else name
         command = f"muscle_node --ros-args -p fiber_file:={given}{model} -p mode:=lockstep"
-        player = _Player(link, timeout_s)
+        player = _Player(link, name, timeout_s)
         link.find(find_s, command)
         _check(link, trials, fibre, command)
         player.meet(find_s)
@@ -80,37 +79,28 @@ def _check(link: Link, trials: Sequence[Trial], fibre: Fibre | None, command: st
     wanted: dict[str, object] = {"mode": "lockstep"}
     if fibre is not None:
         wanted |= {n: v for n, v in flat(fibre).items() if not n.startswith(("source", "constants."))}
-    found = link.parameters(["fibre", *wanted])
+    fibre_there = link.parameters(["fibre"])["fibre"]
     for trial in trials:
-        if trial.facts.fibre != found["fibre"]:
+        if trial.facts.fibre != fibre_there:
             raise UserError(
-                f"node {link.peer} has fibre {found['fibre']}, trial {trial.facts.trial} is of fibre "
+                f"node {link.peer} has fibre {fibre_there}, trial {trial.facts.trial} is of fibre "
                 f"{trial.facts.fibre}; end the node and start another: {command}"
             )
-    for name, value in wanted.items():
-        if found.get(name) != value:
-            raise UserError(
-                f"node {link.peer} has {name} = {found.get(name, 'none')}, needed is {value}; end the node and start "
-                f"another: {command}"
-            )
+    link.check(wanted, command)
 
 
 class _Player:
     """Topics on one side, arrays on the other."""
 
-    def __init__(self, link: Link, timeout_s: float) -> None:
+    def __init__(self, link: Link, fibre: str, timeout_s: float) -> None:
         self._link = link
         self._timeout_s = timeout_s
         node = link.node
-        qos = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
-        self._length = node.create_publisher(JointState, "muscle/length", qos)
-        self._calcium = node.create_publisher(JointState, "muscle/calcium", qos)
+        self._length, self._calcium = (Sender(node, f"muscle/{topic}", [fibre]) for topic in ("length", "calcium"))
         self._inlets = [
-            node.create_subscription(JointState, "muscle/force", self._on_force, qos),
-            node.create_subscription(JointState, "muscle/moments", self._on_moments, qos),
+            node.create_subscription(JointState, "muscle/force", self._on_force, reliable()),
+            node.create_subscription(JointState, "muscle/moments", self._on_moments, reliable()),
         ]
-        self._message = JointState()
-        self._position = room(self._message, "position", 1)
         self._met = False
         self._begin({}, 0)
 
@@ -120,14 +110,12 @@ class _Player:
         Raises:
             UserError: they do not in time.
         """
-        ends = (self._length, self._calcium)
+        ends = (self._length.publisher, self._calcium.publisher)
         if not self._link.wait_for(lambda: all(end.get_subscription_count() for end in ends), timeout_s):
-            raise UserError(
-                f"node {self._link.peer} does not listen to {self._length.topic_name}; check its remappings"
-            )
+            raise UserError(f"node {self._link.peer} does not listen to {ends[0].topic_name}; check its remappings")
 
     def _check_alone(self) -> None:
-        topics = [end.topic_name for end in (self._length, self._calcium)]
+        topics = [end.publisher.topic_name for end in (self._length, self._calcium)]
 
         def others() -> int:
             return sum(self._link.node.count_publishers(topic) - 1 for topic in topics)
@@ -151,7 +139,6 @@ class _Player:
         self._link.set_parameters(
             {"constants.reference_length_m": facts.reference_length_m, "constants.f0_n": facts.f0_n}
         )
-        self._message.name = [facts.fibre]
         for wait in (False, True):
             self._play(trial, plan, wait)
             account = self._link.reset()
@@ -179,23 +166,21 @@ class _Player:
             window = range(first, min(first + _WINDOW, stamps.size))
             self._send_calcium(trial, plan, sorted({int(i) for i in plan.held[first : window.stop]}), wait)
             for k in window:
-                self._send(self._length, int(stamps[k]), trial.length_m[k])
+                self._length.send(int(stamps[k]), trial.length_m[k])
             self._await(window, trial, plan)
 
     def _start(self, trial: Trial, plan: _Plan, wait: bool) -> None:
         """Send the first sample, and again after a reset while the node's answers may not find their way yet."""
-        end = time.monotonic() + self._timeout_s
-        while True:
-            self._link.reset()
+
+        def send() -> None:
             self._sent_calcium, self._newest_calcium = 0, -1
             self._send_calcium(trial, plan, [int(plan.held[0])], wait)
-            self._send(self._length, int(plan.stamps[0]), trial.length_m[0])
-            patience = self._timeout_s if self._met else _HANDSHAKE_S
-            if self._link.wait_for(lambda: bool(self._missing[0] == 0), patience):
-                self._met = True
-                return
-            if time.monotonic() >= end:
-                self._give_up(0, trial, plan)
+            self._length.send(int(plan.stamps[0]), trial.length_m[0])
+
+        patience = self._timeout_s if self._met else _HANDSHAKE_S
+        self._met = self._link.begin(send, lambda: bool(self._missing[0] == 0), self._timeout_s, patience)
+        if not self._met:
+            self._give_up(0, trial, plan)
 
     def _begin(self, index: dict[int, int], samples: int) -> None:
         self._index = index
@@ -206,24 +191,18 @@ class _Player:
         # How many were sent since the last reset, and the index of the newest of them.
         self._sent_calcium, self._newest_calcium = 0, -1
 
-    def _send(self, publisher: Any, stamp: int, value: float) -> None:
-        header = self._message.header.stamp
-        header.sec, header.nanosec = divmod(stamp, 1_000_000_000)
-        self._position[0] = value
-        publisher.publish(self._message)
-
     def _send_calcium(self, trial: Trial, plan: _Plan, needed: Sequence[int], wait: bool) -> None:
         """Send calcium that was not sent yet, if wanted until the node has it."""
         new = [i for i in needed if i > self._newest_calcium]
         for i in new:
-            self._send(self._calcium, int(plan.calcium_stamps[i]), trial.calcium_um[i])
+            self._calcium.send(int(plan.calcium_stamps[i]), trial.calcium_um[i])
             self._newest_calcium = i
         self._sent_calcium += len(new)
         if new and wait:
             self._wait_for_calcium(trial)
 
     def _wait_for_calcium(self, trial: Trial) -> None:
-        if not self._calcium.wait_for_all_acked(Duration(seconds=self._timeout_s)):
+        if not self._calcium.publisher.wait_for_all_acked(Duration(seconds=self._timeout_s)):
             raise UserError(f"trial {trial.facts.trial}: node {self._link.peer} does not take calcium; is it running?")
 
     def _await(self, window: range, trial: Trial, plan: _Plan) -> None:

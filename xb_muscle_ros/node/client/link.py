@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
-from types import TracebackType
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import rclpy
@@ -17,7 +16,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.node.executor import make_executor
+from xb_muscle_ros.node.program import make_executor
 from xb_muscle_ros.node.status import Account
 
 _ANSWER_S = 10.0
@@ -26,6 +25,18 @@ _SEND_AGAIN_S = 3.0
 
 def _never() -> bool:
     return False
+
+
+def _node(name: str, namespace: str, domain_id: int | None) -> Any:
+    """A node in a context of its own, and deaf to the arguments of the program that uses it."""
+    context = Context()
+    try:
+        context.init(args=[], domain_id=domain_id)
+        return rclpy.create_node(
+            name, context=context, namespace=namespace, use_global_arguments=False, enable_rosout=False
+        )
+    except Exception as error:
+        raise UserError(f"ROS 2 cannot be started: {error}; check ROS_DOMAIN_ID and the network") from error
 
 
 class Link:
@@ -37,45 +48,28 @@ class Link:
         stop: asked while waiting; where it says so, no wait goes on.
     """
 
-    def __init__(self, name: str, namespace: str = "", domain_id: int | None = None) -> None:
-        """Join the graph; `domain_id` None stands for that of the environment.
+    def __init__(self, name: str = "", namespace: str = "", domain_id: int | None = None, node: Any = None) -> None:
+        """Join the graph.
+
+        Args:
+            name, namespace: of the node that is made.
+            domain_id: of ROS; None stands for that of the environment.
+            node: in its place, one that is there already; closing ends it and its context.
 
         Raises:
             UserError: ROS cannot be started.
         """
         self.peer = ""
-        self._context = Context()
-        try:
-            # In a context of its own, and deaf to the arguments of the program that uses it.
-            self._context.init(args=[], domain_id=domain_id)
-            self.node: Any = rclpy.create_node(
-                name, context=self._context, namespace=namespace, use_global_arguments=False, enable_rosout=False
-            )
-        except Exception as error:
-            raise UserError(f"ROS 2 cannot be started: {error}; check ROS_DOMAIN_ID and the network") from error
-        self._serve()
-
-    @classmethod
-    def around(cls, node: Any) -> Link:
-        """The same with a node that is there already; closing ends it and its context."""
-        link = cls.__new__(cls)
-        link.peer = ""
-        link.node = node
-        link._context = node.context
-        link._serve()
-        return link
-
-    def _serve(self) -> None:
         self.stop: Callable[[], bool] = _never
+        self.node = node or _node(name, namespace, domain_id)
+        self._context = self.node.context
         self._executor = make_executor(self._context)
         self._executor.add_node(self.node)
 
     def __enter__(self) -> Link:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -153,6 +147,21 @@ class Link:
         # One unknown name empties the whole answer; ask one by one.
         return {name: value for one in names for name, value in self.parameters([one]).items()}
 
+    def check(self, wanted: Mapping[str, object], command: str, more: Sequence[str] = ()) -> dict[str, Any]:
+        """Values of the muscle node's parameters, some of which must be those wanted, `more` whatever they are.
+
+        Raises:
+            UserError: one is not as wanted; `command` starts a node that would do.
+        """
+        found = self.parameters([*wanted, *more])
+        for name, value in wanted.items():
+            if found.get(name) != value:
+                raise UserError(
+                    f"node {self.peer} has {name} = {found.get(name, 'none')}, needed is {value}; end the node and "
+                    f"start another: {command}"
+                )
+        return found
+
     def set_parameters(self, values: Mapping[str, object]) -> None:
         """Set parameters of the muscle node, all or none.
 
@@ -182,3 +191,25 @@ class Link:
         if account is None:
             raise UserError(f"node {self.peer} answers to reset with '{response.message}'; use the same version there")
         return account
+
+    def begin(
+        self, send: Callable[[], None], answered: Callable[[], bool], timeout_s: float, patience_s: float
+    ) -> bool:
+        """Reset the muscle node and send it something, both again while its answers may not find their way yet.
+
+        Args:
+            send: called after every reset.
+            answered: whether the answer is there.
+            timeout_s, patience_s: longest wait in all, and for one answer, s.
+
+        Returns:
+            whether an answer came.
+        """
+        end = time.monotonic() + timeout_s
+        while True:
+            self.reset()
+            send()
+            if self.wait_for(answered, patience_s):
+                return True
+            if time.monotonic() >= end:
+                return False

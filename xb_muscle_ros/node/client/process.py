@@ -9,9 +9,8 @@ import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 
-_PACKAGE_PARENT = Path(__file__).resolve().parents[2]
+_PACKAGE_PARENT = Path(__file__).resolve().parents[3]
 _PATIENCE_S = 10.0
 
 
@@ -61,6 +60,7 @@ class NodeProcess:
         for name, value in parameters.items():
             text = str(value).lower() if isinstance(value, bool) else str(value)
             command += ["-p", f"{name}:={text}"]
+        self._asked = False
         self._log = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 - closed at the exit
         self.process = subprocess.Popen(
             command, env=child_environment(domain_id), stdout=self._log, stderr=self._log, stdin=subprocess.DEVNULL
@@ -79,10 +79,16 @@ class NodeProcess:
         """
         return self.process.wait(timeout_s)
 
+    def ask_to_stop(self) -> None:
+        """Send SIGINT, once, and do not wait."""
+        if self.process.poll() is None and not self._asked:
+            self._asked = True
+            self.process.send_signal(signal.SIGINT)
+
     def stop(self) -> int:
         """End the node with SIGINT, or by force if that does not do; returns its exit code."""
         if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
+            self.ask_to_stop()
             try:
                 self.process.wait(_PATIENCE_S)
             except subprocess.TimeoutExpired:
@@ -93,8 +99,6 @@ class NodeProcess:
     def __enter__(self) -> NodeProcess:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
         self._log.close()

@@ -10,9 +10,9 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.node.client.link import Link
+from xb_muscle_ros.node.client.process import NodeProcess
 from xb_muscle_ros.node.diagnostics import status_name
-from xb_muscle_ros.node.link import Link
-from xb_muscle_ros.node.process import NodeProcess
 
 START_S = 60.0
 _KEYS = {

@@ -1,4 +1,4 @@
-"""Keep the process in memory, so that no tick waits for the disk."""
+"""What a realtime process asks of the system, and goes on without where that is not permitted: priority, memory."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ _MCL_CURRENT, _MCL_FUTURE = 1, 2
 
 
 def lock_memory(log: Log) -> None:
-    """Lock all pages, where no limit is set those to come as well; where that is not permitted, say so and go on."""
+    """Lock all pages, so that no tick waits for the disk, where no limit is set those to come as well.
+
+    Where that is not permitted, say so and go on.
+    """
     why = "only Linux is known to"
     if sys.platform.startswith("linux"):
         import resource
@@ -34,3 +37,23 @@ def unlock_memory() -> None:
     """Let pages go again."""
     if sys.platform.startswith("linux"):
         ctypes.CDLL(None).munlockall()
+
+
+def take_priority(priority: int, log: Log) -> bool:
+    """Put the calling thread under SCHED_FIFO; where that is not permitted, say so and go on. Whether it is."""
+    try:
+        # 0 is the calling thread, on Linux.
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except (AttributeError, OSError) as error:
+        log.warning(
+            f"realtime_priority {priority} is not permitted here ({error}): ordinary scheduling goes on; allow it with "
+            "'ulimit -r', an rtprio line in limits.conf or CAP_SYS_NICE"
+        )
+        return False
+    return True
+
+
+def drop_priority() -> None:
+    """Put the calling thread back under ordinary scheduling."""
+    if hasattr(os, "sched_setscheduler") and os.sched_getscheduler(0) == os.SCHED_FIFO:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

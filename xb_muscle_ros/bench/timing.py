@@ -12,16 +12,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 from sensor_msgs.msg import JointState
 
+from xb_muscle_ros.bench.measured import START_S, Measured
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.node.inputs import stamp_ns
-from xb_muscle_ros.node.link import Link
-from xb_muscle_ros.node.measured import START_S, Measured
-from xb_muscle_ros.node.outputs import room
-from xb_muscle_ros.node.process import NodeProcess, private_domain
-from xb_muscle_ros.node.waiting import make_waiter
+from xb_muscle_ros.node.client.link import Link
+from xb_muscle_ros.node.client.process import NodeProcess, private_domain
+from xb_muscle_ros.node.client.wires import Sender, reliable
+from xb_muscle_ros.node.rules import stamp_ns
+from xb_muscle_ros.node.ticker import make_waiter
 
 _INPUT_HZ = 500.0
 PLAIN = "xb_muscle_ros.bench.plain_timer"
@@ -153,14 +152,10 @@ class _Pinger:
 
     def __init__(self, link: Link, fibres: Sequence[str]) -> None:
         self._link = link
-        qos = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
         node = link.node
-        self._length = node.create_publisher(JointState, "muscle/length", qos)
-        self._calcium = node.create_publisher(JointState, "muscle/calcium", qos)
-        self._inlet = node.create_subscription(JointState, "muscle/force", self._on_force, qos)
-        self._message = JointState(name=list(fibres))
+        self._length, self._calcium = (Sender(node, f"muscle/{topic}", fibres) for topic in ("length", "calcium"))
+        self._inlet = node.create_subscription(JointState, "muscle/force", self._on_force, reliable())
         self._count = max(len(fibres), 1)
-        self._position = room(self._message, "position", self._count)
         self._answered = (-1, 0)
 
     def meet(self) -> None:
@@ -169,14 +164,13 @@ class _Pinger:
         Raises:
             UserError: none does.
         """
-        end = time.monotonic() + START_S
-        while time.monotonic() < end:
-            self._link.reset()
-            self._send(self._calcium, 0, 5.0)
-            self._send(self._length, 0, 1.0)
-            if self._link.wait_for(lambda: self._answered[0] == 0, 1.0):
-                return
-        raise UserError(f"node {self._link.peer} does not answer length; see its log")
+
+        def send() -> None:
+            self._calcium.send(0, 5.0)
+            self._length.send(0, 1.0)
+
+        if not self._link.begin(send, lambda: self._answered[0] == 0, START_S, 1.0):
+            raise UserError(f"node {self._link.peer} does not answer length; see its log")
 
     def run(self, duration_s: float, rate_hz: float) -> dict[str, float]:
         """Measure."""
@@ -193,9 +187,9 @@ class _Pinger:
             stamp = (k + 1) * period
             value = 1.0 + 0.01 * math.sin(2.0 * math.pi * k / rate_hz)
             if k % 50 == 0:
-                self._send(self._calcium, stamp - period // 2, 3.0 + 2.5 * math.sin(k))
+                self._calcium.send(stamp - period // 2, 3.0 + 2.5 * math.sin(k))
             sent = time.monotonic_ns()
-            self._send(self._length, stamp, value)
+            self._length.send(stamp, value)
             if not self._link.wait_for(lambda stamp=stamp: self._answered[0] == stamp, 10.0):  # type: ignore[misc]
                 raise UserError(f"node {self._link.peer} left the message at {stamp * 1e-9:g} s unanswered")
             took[k] = (self._answered[1] - sent) * 1e-3
@@ -213,13 +207,6 @@ class _Pinger:
             "rate_hz": count / seconds,
         }
 
-    def _send(self, publisher: Any, stamp: int, value: float) -> None:
-        header = self._message.header.stamp
-        header.sec, header.nanosec = divmod(stamp, 1_000_000_000)
-        for i in range(self._count):
-            self._position[i] = value
-        publisher.publish(self._message)
-
     def _on_force(self, message: JointState) -> None:
         if len(message.effort) == self._count:
             self._answered = (stamp_ns(message.header.stamp), time.monotonic_ns())
@@ -229,9 +216,7 @@ class _Feeder:
     """Publishes a length sine of 1 % of L0 at 1 Hz, and a calcium that moves up and down."""
 
     def __init__(self, node: Any, fibres: Sequence[str]) -> None:
-        self._fibres = list(fibres)
-        self._length = node.create_publisher(JointState, "muscle/length", 10)
-        self._calcium = node.create_publisher(JointState, "muscle/calcium", 10)
+        self._length, self._calcium = (Sender(node, f"muscle/{topic}", fibres, 10) for topic in ("length", "calcium"))
         self._clock = node.get_clock()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="feeder", daemon=True)
@@ -248,22 +233,14 @@ class _Feeder:
     def _run(self) -> None:
         wait = make_waiter()
         period = round(1e9 / _INPUT_HZ)
-        message = JointState(name=self._fibres)
-        fibres = range(max(len(self._fibres), 1))
-        position = room(message, "position", len(fibres))
         begin = deadline = time.monotonic_ns()
         count = 0
         while not self._stop.is_set():
             seconds = (deadline - begin) * 1e-9
-            message.header.stamp = self._clock.now().to_msg()
+            stamp = int(self._clock.now().nanoseconds)
             if count % 50 == 0:
-                for i in fibres:
-                    position[i] = 3.0 + 2.5 * math.sin(2.0 * math.pi * 0.3 * seconds)
-                self._calcium.publish(message)
-            length = 1.0 + 0.01 * math.sin(2.0 * math.pi * seconds)
-            for i in fibres:
-                position[i] = length
-            self._length.publish(message)
+                self._calcium.send(stamp, 3.0 + 2.5 * math.sin(2.0 * math.pi * 0.3 * seconds))
+            self._length.send(stamp, 1.0 + 0.01 * math.sin(2.0 * math.pi * seconds))
             count += 1
             deadline += period
             wait(deadline)

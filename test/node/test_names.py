@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 from many_fibres import NAMES
 
-from xb_muscle_ros.node.inputs import Refusal
-from xb_muscle_ros.node.several import NamesOfMany
+from xb_muscle_ros.node.names import Names, front
+from xb_muscle_ros.node.rules import Refusal
 
 
 def test_names_find_their_places() -> None:
     """In any order, some or all, none for all; strangers are news once; of a name that comes twice the first counts."""
-    names = NamesOfMany(NAMES)
+    names = Names(NAMES)
     everyone = names.places([], 3, "position")
     assert (everyone.fibres.tolist(), everyone.values, everyone.new) == ([0, 1, 2], None, [])
     for _ in range(2):
@@ -26,3 +26,24 @@ def test_names_find_their_places() -> None:
     for wrong, values in ((["left"], 2), ([], 2), ([], 1), (["left", "right"], 1)):
         with pytest.raises(Refusal, match="send one per name"):
             names.places(wrong, values, "position")
+
+
+@pytest.mark.parametrize(("names", "values"), [([], 0), ([], 2), (["a"], 0), (["a"], 2), (["a", "b"], 1)])
+def test_as_many_values_as_names(names: list[str], values: int) -> None:
+    """Anything else is ambiguous."""
+    with pytest.raises(Refusal, match="send one per name"):
+        Names(["a"]).places(names, values, "position")
+
+
+def test_a_sender_that_makes_up_names_does_not_fill_the_memory() -> None:
+    """Reported they are still."""
+    names = Names(["a"])
+    for k in range(2000):
+        assert names.places([f"n{k}"], 1, "position").new == [f"n{k}"]
+    assert len(names._strangers) <= 1000
+
+
+def test_one_fibre_needs_no_name() -> None:
+    """Of many some are named."""
+    assert front(["left"], [0]) == ""
+    assert front(NAMES, [2, 0]) == "back, left: "
