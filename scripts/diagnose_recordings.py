@@ -28,8 +28,7 @@ from xb_muscle_ros.cli.common import add_work, work_options_of
 from xb_muscle_ros.diagnose.effort import QUICK, Effort
 from xb_muscle_ros.diagnose.feature_tables import read_features
 from xb_muscle_ros.diagnose.intake import FibreStudy
-from xb_muscle_ros.diagnose.outputs import write
-from xb_muscle_ros.diagnose.report import output
+from xb_muscle_ros.diagnose.outputs import JSON, read, write
 from xb_muscle_ros.diagnose.result import Diagnosis
 from xb_muscle_ros.diagnose.run import diagnose
 from xb_muscle_ros.errors import UserError
@@ -100,7 +99,7 @@ def _text(path: Path) -> str:
 
 def forget(folder: Path) -> None:
     """Remove what a case found, and its journal; its bags stay."""
-    for name in (output.JSON, "predictions.json", "journal.jsonl"):
+    for name in (JSON, "predictions.json", "journal.jsonl"):
         (folder / name).unlink(missing_ok=True)
 
 
@@ -117,9 +116,9 @@ def run_case(
     absent = [p for p in (*case.shown, *sum(case.concealed.values(), ())) if not chosen(trials, [p])]
     if absent:
         raise UserError(f"no recording of {', '.join(absent)}; name all folders of recordings with --recordings")
-    if not (folder / output.JSON).exists():
+    if not (folder / JSON).exists():
         diagnose_shown(case, shown, features, folder, quick, replace(options, journal=folder / "journal.jsonl"))
-    d = output.read(folder)
+    d = read(folder)
     bases = [base_fibre(load_fibre(folder / _file("start", name, d)), d) for name in d.fibres]
     for base in bases:
         write_fibre(folder / _file("base", base.name, d), base, ["The base of the diagnosis beside it, as fitted."])

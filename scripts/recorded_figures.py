@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.report import output
+from xb_muscle_ros.diagnose import outputs
 from xb_muscle_ros.diagnose.report.traces import TrialTraces, read_traces
 from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure
 
@@ -34,10 +34,10 @@ class _Panel(NamedTuple):
 
 def write_figure(folder: Path, path: Path) -> Path:
     """Draw a case's traces from what was written into its folder; returns the path."""
-    d = output.read(folder)
+    d = outputs.read(folder)
     found = json.loads((folder / "predictions.json").read_text(encoding="utf-8"))
     several = len(d.fibres) > 1
-    shown = [_of_shown(t, several, bool(d.named)) for t in _typical(read_traces(folder / output.TRACES))]
+    shown = [_of_shown(t, several, bool(d.named)) for t in _typical(read_traces(folder / outputs.TRACES))]
     with np.load(folder / "predictions.npz") as arrays:
         hidden = [_of_concealed(arrays, k, row, several) for k, row in enumerate(found["concealed"])]
     above, below = math.ceil(len(shown) / _COLUMNS), math.ceil(len(hidden) / _COLUMNS)

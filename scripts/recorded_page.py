@@ -13,8 +13,9 @@ from recorded_cases import Case
 from recorded_predictions import END_S
 from recorded_tables import components, concealed, feature_scores, fibres, force, places, probability, sets, table
 
+from xb_muscle_ros.diagnose import outputs
 from xb_muscle_ros.diagnose.component import Kind
-from xb_muscle_ros.diagnose.report import output, prose
+from xb_muscle_ros.diagnose.report import prose
 from xb_muscle_ros.diagnose.result import Diagnosis
 
 INTRO = """# Real recordings
@@ -40,7 +41,7 @@ def write_page(done: Sequence[tuple[Case, Path]], images: str, former: str = "")
         images: folder of the figures, as the page links it.
         former: the page as it stands; its sections of cases that are not among `done` are kept.
     """
-    read = [(case, folder, output.read(folder), _rows(folder)) for case, folder in done]
+    read = [(case, folder, outputs.read(folder), _rows(folder)) for case, folder in done]
     made = [section(case, d, rows, images) for case, _, d, rows in read if not case.pooled or case.concealed]
     made += [_singly(key, [(c, d) for c, _, d, _ in read if c.pooled == key]) for key in _pools(read)]
     titles = {match[1] for text in made for match in _HEADING.finditer(text)}
@@ -113,7 +114,7 @@ def section(case: Case, d: Diagnosis, rows: Sequence[dict[str, Any]], images: st
         "held-out RMSD without and with it):\n\n" + components(d),
         "Each fibre:\n\n" + fibres(d) if many else "",
         "Where the base differs most:\n\n" + places(d.mismatch),
-        "What the answer leaves:\n\n" + places(d.remaining.where) if d.named else "",
+        "What the answer leaves:\n\n" + places(d.residual.places) if d.named else "",
         "Most probable sets:\n\n" + sets(d),
         _concealed(d, rows),
         "RMSD of relative SRS at conditions that no trace has (`empirical_srs.json`, readings of "

@@ -60,7 +60,7 @@ def predicted(fibre: Fibre, trial: FitTrial, shared: Mapping[str, float]) -> Cal
 
 def shared_errors(d: Diagnosis, fibre: str, model: str) -> dict[str, float]:
     """Errors that all recordings of a fibre share, by name, with one of the models ``before`` and ``after``."""
-    own = [row for row in d.nuisances if row.fibre == fibre and row.name in _SHARED]
+    own = [row for row in d.nuisance_parameters if row.fibre == fibre and row.name in _SHARED]
     return {row.name: (row.before or 0.0) if model == "before" else row.value for row in own}
 
 

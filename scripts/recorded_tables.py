@@ -8,7 +8,8 @@ from typing import Any
 
 from xb_muscle_ros.diagnose.component import NAMED, OfFibre
 from xb_muscle_ros.diagnose.report import phrases as say
-from xb_muscle_ros.diagnose.result import Diagnosis, Place
+from xb_muscle_ros.diagnose.residual import Place
+from xb_muscle_ros.diagnose.result import Diagnosis
 
 _PLACES, _SETS, _COMPONENTS = 6, 8, 8
 # Components less probable than this are counted only.
@@ -38,7 +39,7 @@ def components(d: Diagnosis) -> str:
     for c in shown:
         told = "; ".join(f"{p.name} {say.estimate(p)}{' at bound' if p.at_bound else ''}" for p in c.parameters)
         name = c.members[0] if len(c.members) == 1 else f"{c.name}: {' or '.join(c.members)}"
-        share = say.share(c.share_of_mismatch) if c.inclusion_probability >= NAMED else say.NOTHING
+        share = say.share(c.ablation_loss) if c.inclusion_probability >= NAMED else say.NOTHING
         cells.append(
             [
                 name, c.kind.value, probability(c.inclusion_probability), share, say.gain(c.heldout_gain),

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from xb_muscle_ros.diagnose.report import output
+from xb_muscle_ros.diagnose import outputs
 
 _SCRIPTS = Path(__file__).parents[2] / "scripts"
 
@@ -72,7 +72,7 @@ def test_a_section_has_every_fibre_and_an_overview_every_study(
     monkeypatch.syspath_prepend(Path(__file__).parents[1] / "diagnose" / "report")
     d = importlib.import_module("sample_diagnoses").five_fibres().diagnosis
     cases = importlib.import_module("recorded_cases").CASES
-    (tmp_path / "diagnosis.json").write_text(json.dumps(output.as_row(d)))
+    (tmp_path / "diagnosis.json").write_text(json.dumps(outputs.as_row(d)))
     (tmp_path / "predictions.json").write_text(json.dumps({"concealed": [_row(0.02, 0.01), _row(0.02, 0.05)]}))
     text = page.write_page([(cases["fibres_2state"], tmp_path)], "images", "## Five rat soleus fibres, base `2state`\n")
     assert page.FORMER not in text

@@ -49,7 +49,7 @@ def said(verdict: str, stated: dict[str, float], **more: Any) -> dict[str, Any]:
         rows.append(
             {
                 "name": name, "kind": "artefact" if artefact else "mechanism", "family": family, "members": members,
-                "inclusion_probability": probability, "share_of_mismatch": 0.5,
+                "inclusion_probability": probability, "ablation_loss": 0.5,
             }
         )  # fmt: skip
     answer = [r["name"] for r in rows if r["kind"] == "mechanism" and r["inclusion_probability"] >= 0.5]

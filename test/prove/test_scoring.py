@@ -15,7 +15,8 @@ from sample_diagnoses import nothing
 from xb_muscle_ros.cli.main import main
 from xb_muscle_ros.diagnose.component import Component, Kind
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
-from xb_muscle_ros.diagnose.result import Diagnosis, Place, Verdict
+from xb_muscle_ros.diagnose.residual import Place
+from xb_muscle_ros.diagnose.result import Diagnosis, Verdict
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.prove.counting import interval, scores
 from xb_muscle_ros.prove.judging import judge

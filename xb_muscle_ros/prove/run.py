@@ -76,7 +76,7 @@ def _task(folder: Path, out: Path, name: str, quick: bool, seed: int) -> dict[st
 
 def _diagnose(task: Mapping[str, Any]) -> dict[str, JsonValue]:
     """Diagnose one case; a case that the tool cannot do is a result as well."""
-    from xb_muscle_ros.diagnose.report.output import as_row
+    from xb_muscle_ros.diagnose.outputs import as_row
     from xb_muscle_ros.diagnose.run import diagnose_bags
     from xb_muscle_ros.trials.bags import find_bags
 

@@ -13,7 +13,7 @@ from layout_of_figures import boxes, outside, touching
 from many_of_everything import many
 from sample_diagnoses import ALL, Sample, five_fibres, nothing, one_fibre, unexplained
 
-from xb_muscle_ros.diagnose.report.figures import before_after, fibres, laws, parts, probabilities, remains
+from xb_muscle_ros.diagnose.report.figures import before_after, contributions, fibres, laws, probabilities, residual_map
 from xb_muscle_ros.diagnose.report.figures.common import Figure, trial_labels
 from xb_muscle_ros.diagnose.result import Diagnosis
 
@@ -26,9 +26,9 @@ def draw_all(sample: Sample) -> dict[str, Figure | None]:
     return {
         "before_after": before_after.draw_before_after(d, traces),
         "probabilities": probabilities.draw_probabilities(d),
-        "parts": parts.draw_parts(d, traces),
+        "contributions": contributions.draw_contributions(d, traces),
         "fibres": fibres.draw_fibres(d),
-        "map": remains.draw_map(d),
+        "map": residual_map.draw_map(d),
         "laws": laws.draw_laws(d),
     }
 
@@ -43,7 +43,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         seen.append((touching(found), outside(made, found), [text for text, _ in found], 25.4 * made.get_figheight()))
         return ""
 
-    for module in (before_after, fibres, laws, parts, probabilities, remains):
+    for module in (before_after, contributions, fibres, laws, probabilities, residual_map):
         monkeypatch.setattr(module, "svg", looked_at)
     return seen
 
@@ -71,7 +71,7 @@ def test_what_is_left_out_is_said(drawn: list[Any]) -> None:
     figures = draw_all(many(40, 5, 30, 31))
     captions = {name: figure.caption for name, figure in figures.items() if figure}
     assert "14 of 31 candidates shown" in captions["probabilities"]
-    assert "3 of 200 trials shown" in captions["parts"]
+    assert "3 of 200 trials shown" in captions["contributions"]
     assert "12 of 40 fibres shown" in captions["fibres"]
     assert "10 of 31 candidates shown" in captions["fibres"]
     assert "36 of 200 trials shown" in captions["map"]
@@ -96,7 +96,7 @@ def test_where_the_answer_is_the_base_one_model_is_shown_and_that_is_said(drawn:
     written = {text for _, _, texts, _ in drawn for text in texts}
     assert "base model" in written
     assert "answer" not in written
-    for name in ("before_after", "parts"):
+    for name in ("before_after", "contributions"):
         figure = figures[name]
         assert figure is not None
         assert "to which the answer adds nothing" in figure.caption
@@ -113,7 +113,7 @@ def test_telling_trials_are_the_best_the_median_and_the_worst() -> None:
 def test_no_error_no_figure() -> None:
     d = one_fibre().diagnosis
     bare = replace(d, trials=(), map_before={}, map_after={}, components=(), base_law=None,
-                   remaining=replace(d.remaining, law=None))  # fmt: skip
+                   residual=replace(d.residual, law=None))  # fmt: skip
     assert set(draw_all(Sample(bare, ())).values()) == {None}
 
 
@@ -129,7 +129,7 @@ def test_every_number_may_be_unknown(drawn: list[Any]) -> None:
             for c in d.components
         ),
         by_fibre=tuple(replace(f, left_out_rmsd_f0=(nan, nan)) for f in d.by_fibre),
-        base_law=d.base_law and replace(d.base_law, time_constant_s=nan, weight_f0=(nan,) * 11, others={}),
+        base_law=d.base_law and replace(d.base_law, time_constant_s=nan, weight_f0=(nan,) * 11, other_scalings={}),
         benchmark_rmsd_f0=nan,
     )
     traces = tuple(replace(t, before_f0=np.full_like(t.before_f0, nan), without_f0={}) for t in traces)

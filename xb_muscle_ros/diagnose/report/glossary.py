@@ -23,13 +23,12 @@ GLOSSARY: Mapping[str, Term] = MappingProxyType(
     {
         "base": Term(
             "Base model",
-            "The model of the fibre file with its parameters and ordinary measurement errors fitted to all trials, and "
-            "nothing added.",
+            "The model of the fibre file. Its parameters and the ordinary measurement artefacts are fitted to all "
+            "trials; nothing is added.",
         ),
         "answer": Term(
             "Answer",
-            "The base model with every mechanism and artefact whose inclusion probability is 0.5 or more, fitted in "
-            "the same way.",
+            "The base model with every component whose inclusion probability is 0.5 or more, fitted in the same way.",
         ),
         "component": Term(
             "Component",
@@ -47,25 +46,27 @@ GLOSSARY: Mapping[str, Term] = MappingProxyType(
             "A fibre replicates a component where its own recordings speak for what the other fibres show: with the "
             "effect distributed as in the others, its log Bayes factor is 1 or more (2.7 to 1).",
         ),
-        "share_of_mismatch": Term(
-            "Share of mismatch",
-            "Ablation loss: what of the base model's mismatch comes back if this component alone is taken out of the "
-            "answer. It is a fraction of the mean square beyond noise; shares of several components need not add up "
-            "to what they explain together.",
+        "ablation_loss": Term(
+            "Ablation loss",
+            "The fraction of the base model's mismatch (mean square beyond noise) that the answer explains with "
+            "this component and does not explain without it, all else fitted anew. Ablation losses need not add up "
+            "to the explained fraction.",
         ),
-        "explained_share": Term(
-            "Explained share",
-            "Fraction of the base model's mismatch, as mean square beyond noise, that the answer as a whole removes.",
+        "explained_fraction": Term(
+            "Explained fraction",
+            "The fraction of the base model's mismatch, as mean square beyond noise, that the answer as a whole "
+            "removes.",
         ),
         "heldout": Term(
             "Held out",
-            "Left out of the fit and predicted by it: every condition in turn, and in a study of several fibres every "
-            "fibre.",
+            "Not shown to a fit and predicted by it: every condition in turn, and in a study of several fibres "
+            "every fibre.",
         ),
         "heldout_gain": Term(
             "Held-out gain",
-            "Logarithm of the held-out force RMSD without a component over that with it, as mean and standard error "
-            "over the conditions left out. 0.10 means that the error falls by about 10 %; below 0 it rises.",
+            "Logarithm of the held-out force RMSD without a component over that with it: mean and standard error "
+            "over the held-out conditions. A gain of 0.10 means an error lower by about 10 %; below 0 the error is "
+            "higher.",
         ),
         "interval": Term(
             "Interval",
@@ -81,8 +82,8 @@ GLOSSARY: Mapping[str, Term] = MappingProxyType(
         "direction": Term("Direction", "What a component does to the force as it was fitted, in words."),
         "not_separable_from": Term(
             "Not separable from",
-            "Components with which this one trades probability: a set that has one of them seldom needs the other. The "
-            "recordings tell better that one of them is there than which.",
+            "Components with which this one trades probability: a set that has one of them seldom needs the other. "
+            "The recordings tell that one of them is there better than which.",
         ),
         "family": Term(
             "Family", "Mechanisms that act on the same thing in nearly the same way, so that few recordings part them."
@@ -92,13 +93,16 @@ GLOSSARY: Mapping[str, Term] = MappingProxyType(
             "An error of the recording, such as a transducer that drifts. It is named only where its estimate lies "
             "beyond what is ordinary.",
         ),
-        "ordinary_error": Term(
-            "Ordinary measurement error",
-            "Errors that every recording has (pCa of a solution, time shift, run-down, force offset, length gain and "
-            "the like). They are nuisance parameters of every model, the base included, with priors as wide as real "
+        "ordinary_artefact": Term(
+            "Ordinary measurement artefact",
+            "What every recording has a little of: pCa of a solution, time shift, run-down, force offset, length "
+            "gain. They are nuisance parameters of every model, the base included, with priors as wide as real "
             "recordings show.",
         ),
-        "prior_sd": Term("Ordinary size", "Prior standard deviation of an ordinary measurement error."),
+        "prior_sd": Term(
+            "Ordinary size",
+            "Prior standard deviation of an ordinary measurement artefact.",
+        ),
         "mismatch": Term(
             "Mismatch",
             "Measured less simulated force of the base model, where it stands out beyond noise. Its size is a root "
@@ -106,23 +110,28 @@ GLOSSARY: Mapping[str, Term] = MappingProxyType(
         ),
         "p_value": Term(
             "p-value",
-            "Chance that noise, put through the same fit, leaves as much anywhere: corrected for all places looked at.",
+            "Probability that noise, put through the same fit, leaves as much anywhere; family-wise over all "
+            'places. "≤" stands where the bootstrap can give no lower value.',
         ),
-        "remaining": Term(
-            "Remaining", "Force RMSD that the answer leaves, and the places where it stands out beyond noise."
+        "residual": Term(
+            "Residual",
+            "Measured less simulated force with the answer's model: its RMSD, and the places where it stands out "
+            "beyond noise.",
         ),
         "law": Term(
-            "Law",
-            "What a residual follows: a weighted sum of memories of stretch, each fading with its own time constant, "
-            "and what it scales with. It describes and does not explain.",
+            "Residual law",
+            "A Prony series (non-negative sum of exponentials) in the length change that describes a residual, and "
+            "what it scales with. It describes and does not explain.",
         ),
         "law_share": Term(
-            "Described by the law", "Share of the residual's mean square that its law predicts in trials left out."
+            "Described by the law",
+            "Fraction of the residual's mean square that its law explains in held-out trials.",
         ),
         "benchmark": Term(
             "Non-parametric discrepancy benchmark",
-            "Held-out force RMSD of the base model plus a flexible discrepancy that knows no physics, learnt from the "
-            "other trials: what could be predicted at all.",
+            "Held-out force RMSD of the base model plus a discrepancy without physics that is learnt from the other "
+            "trials: what could be predicted at all. Where it is above the base model's, nothing could be learnt "
+            "so.",
         ),
         "rmsd": Term(
             "Force RMSD",
@@ -131,7 +140,7 @@ GLOSSARY: Mapping[str, Term] = MappingProxyType(
         ),
         "noise": Term(
             "Noise",
-            "Standard deviation of the measured force beside all that the fibre does, estimated trial by trial.",
+            "Standard deviation of measured force that is not the fibre's, estimated trial by trial.",
         ),
         "set": Term(
             "Set of mechanisms",
@@ -140,18 +149,18 @@ GLOSSARY: Mapping[str, Term] = MappingProxyType(
         ),
         "log_evidence": Term(
             "Log evidence",
-            "Logarithm of the probability of the recordings under a set, relative to the best set, with data that "
-            "count as often as they are independent.",
+            "Logarithm of the probability of the recordings under a set, relative to the best set. Data count by "
+            "their effective sample size.",
         ),
-        "left_out_fibre": Term(
-            "Fibre left out",
+        "heldout_fibre": Term(
+            "Held-out fibre",
             "Force RMSD of a fibre whose effects are taken from the other fibres; its own constants and measurement "
-            "errors are fitted.",
+            "artefacts are fitted.",
         ),
         "closure": Term(
             "Error of the Gaussian form",
-            "What the Gaussian form of the strain distribution itself gets wrong at the fitted point; it is computed "
-            "with the full distribution and taken out of every fit.",
+            "What the Gaussian form of the strain distribution itself gets wrong at the fitted point. It is "
+            "computed with the full distribution and taken out of every fit.",
         ),
         "feature": Term(
             "Feature",
@@ -166,8 +175,3 @@ GLOSSARY: Mapping[str, Term] = MappingProxyType(
     }
 )
 """Every term by its key."""
-
-
-def how() -> dict[str, str]:
-    """Text of every term by its key: what ``how`` in `diagnosis.json` holds."""
-    return {key: term.text for key, term in GLOSSARY.items()}

@@ -53,7 +53,7 @@ def _table(d: Diagnosis) -> list[str]:
 
 def _share(c: Component) -> str:
     """Nothing was taken out where it is not part of the answer."""
-    return say.share(c.share_of_mismatch) if c.inclusion_probability >= NAMED else say.NOTHING
+    return say.share(c.ablation_loss) if c.inclusion_probability >= NAMED else say.NOTHING
 
 
 def _rows(c: Component) -> list[tuple[str, ...]]:
