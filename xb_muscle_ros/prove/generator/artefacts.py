@@ -57,7 +57,8 @@ class Artefacts:
 
     def as_json(self) -> dict[str, Any]:
         """Sizes as JSON can hold them."""
-        return {**asdict(self), "pca_shift": {f"{pca:g}": shift for pca, shift in self.pca_shift.items()}}
+        plain = {name: list(of) if isinstance(of, tuple) else of for name, of in asdict(self).items()}
+        return {**plain, "pca_shift": {f"{pca:g}": shift for pca, shift in self.pca_shift.items()}}
 
 
 def _lagged(force: Array, lag_s: float) -> Array:
