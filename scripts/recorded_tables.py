@@ -34,7 +34,16 @@ def components(d: Diagnosis) -> str:
     """Components with evidence, the most probable first; the first ones where there is none."""
     likely = [c for c in d.components if c.inclusion_probability >= _LEAST][:_COMPONENTS]
     shown = likely or list(d.components[:3])
-    heads = ["component", "kind", "probability", "share", "held-out gain", "parameters (95 %)", "direction", "rivals"]
+    heads = [
+        "component",
+        "kind",
+        "probability",
+        "ablation loss",
+        "held-out gain",
+        "parameters (95 %)",
+        "direction",
+        "rivals",
+    ]
     cells = []
     for c in shown:
         told = "; ".join(f"{p.name} {say.estimate(p)}{' at bound' if p.at_bound else ''}" for p in c.parameters)
@@ -111,8 +120,8 @@ def sets(d: Diagnosis) -> str:
     return table(["set", "probability", "log evidence", "RMSD", "fitted"], cells)
 
 
-def concealed(rows: Sequence[Mapping[str, Any]]) -> str:
-    """How concealed trials are predicted."""
+def heldout(rows: Sequence[Mapping[str, Any]]) -> str:
+    """How held-out trials are predicted."""
     answered = any("after" in row["rmsd_f0"] for row in rows)
     heads = ["tests", "trial", "base"]
     heads += ["answer", "better", "warned beforehand"] if answered else []

@@ -91,7 +91,7 @@ def propose(one: Fibre, other: Fibre, separates: Sequence[str], pcas: Sequence[f
     """The protocol on which two models differ most; None where neither has a solution on any.
 
     Args:
-        one, other: fitted fibres; measurement errors have no part in it, the next recording has its own.
+        one, other: fitted fibres; measurement artefacts have no part in it, the next recording has its own.
         separates: names of the components in which they differ.
         pcas: at which solutions are at hand.
     """

@@ -89,7 +89,7 @@ def _write(out: Path, d: Diagnosis, made: Files, report: bool) -> None:
             fibre,
             [
                 f"Model of fibre {fibre.name} with what a diagnosis found missing; see diagnosis.json beside it.",
-                "The fit also moved ordinary measurement errors, which no model has; they are in diagnosis.json.",
+                "The fit also moved ordinary measurement artefacts, which no model has; they are in diagnosis.json.",
             ],
         )
     if made.protocol is not None:

@@ -33,7 +33,7 @@ from xb_muscle_ros.models.fibre_file import Fibre
 
 Array = npt.NDArray[np.float64]
 
-# More noise than this hides what is looked for, F0; a base that leaves more than this share of the force's standard
+# More noise than this hides what is looked for, F0; a base with a residual of more than this share of the force's standard
 # deviation does not describe the recordings.
 _NOISY_F0, _UNDESCRIBED = 0.02, 0.5
 # A residual follows a law that predicts this share of it where it is left out.
@@ -134,7 +134,7 @@ def _by_component(found: Sequence[Component]) -> tuple[Component, ...]:
 
 
 def _without_errors(study: Searched, chosen: Names, i: int) -> str:
-    """A line on what an augmented file does by itself: measurement errors are in the fit, not in the fibre."""
+    """A line on what an augmented file does by itself: measurement artefacts are in the fit, not in the fibre."""
     recorded, values = study.recorded[i], study.explorer.fits[chosen][i].values
     problem = recorded.problem(chosen, values)
     z = np.array(
@@ -144,12 +144,12 @@ def _without_errors(study: Searched, chosen: Names, i: int) -> str:
     try:
         forces = problem.predicted(z)
     except UserError:
-        return f"{name}: the augmented file has no solution without the measurement errors of the fit"
-    left = [f - t.measured_f0 for f, t in zip(forces, recorded.trials, strict=True)]
+        return f"{name}: the augmented file has no solution without the measurement artefacts of the fit"
+    residual = [f - t.measured_f0 for f, t in zip(forces, recorded.trials, strict=True)]
     with_errors = _rmsd(study.around(chosen, i).residual_f0)
     return (
-        f"{name}: a replay of the augmented file leaves {percent(_rmsd(np.concatenate(left)))} % F0, because files "
-        "have no measurement errors (pCa shifts, gain of length, offsets); with those of the fit it is "
+        f"{name}: a replay of the augmented file leaves {percent(_rmsd(np.concatenate(residual)))} % F0, because files "
+        "have no measurement artefacts (pCa shifts, gain of length, offsets); with those of the fit it is "
         f"{percent(with_errors)} % F0"
     )
 
@@ -162,8 +162,8 @@ def _described(study: Searched, before: Sequence[Around], after: Sequence[Around
     """Whether there is anything to build on: the model describes the recordings, and noise does not hide all."""
     for i, recorded in enumerate(study.recorded):
         spread = float(np.std(recorded.measured))
-        left = min(_rmsd(before[i].residual_f0), _rmsd(after[i].residual_f0))
-        if study.judged.noise_f0[i] > _NOISY_F0 or left > _UNDESCRIBED * spread:
+        residual = min(_rmsd(before[i].residual_f0), _rmsd(after[i].residual_f0))
+        if study.judged.noise_f0[i] > _NOISY_F0 or residual > _UNDESCRIBED * spread:
             return False
     return True
 
@@ -223,8 +223,8 @@ def _missing(study: Searched, verdict: Verdict, found: Sequence[Component], afte
             lines.append(f"force with less noise: {100 * noise:.1f} % F0 in fibre {name} hides what is looked for")
         if _rmsd(after[i].residual_f0) > _UNDESCRIBED * float(np.std(recorded.measured)):
             lines.append(
-                f"recordings that the model describes at all: after the fit half of the force's variation of fibre "
-                f"{name} is left; check that channels, units, calcium and fibre belong together"
+                f"recordings that the model describes at all: after the fit the residual is half of the force's variation "
+                f"of fibre {name}; check that channels, units, calcium and fibre belong together"
             )
     if all(t.facts.pca is None or t.facts.pca < 8.0 for s in study.studies for t in s.trials):
         lines.append("a trial without calcium (pCa 9), which tells passive from active effects")

@@ -16,7 +16,7 @@ BENCHMARK = "benchmark.json"
 VERSION = 3
 """Of keys and public descriptions; former keys are read."""
 SINGLES, COMPOSITES = KINDS = ("singles", "composites")
-"""Kinds of benchmark: at most one thing or a pair is concealed; or several, on top of ordinary error."""
+"""Kinds of benchmark: at most one thing or a pair is concealed; or several, on top of ordinary artefacts."""
 
 
 def older_cases(folder: Path) -> list[Path]:

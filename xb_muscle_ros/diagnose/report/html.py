@@ -7,7 +7,7 @@ import functools
 import re
 from collections.abc import Sequence
 from importlib import resources
-from typing import Any, NamedTuple
+from typing import Any
 
 import jinja2
 from jinja2.filters import do_forceescape, do_mark_safe
@@ -15,7 +15,7 @@ from jinja2.filters import do_forceescape, do_mark_safe
 from xb_muscle_ros.diagnose.component import NAMED
 from xb_muscle_ros.diagnose.report import figures
 from xb_muscle_ros.diagnose.report import phrases as say
-from xb_muscle_ros.diagnose.report.figures.common import Figure, trial_labels
+from xb_muscle_ros.diagnose.report.figures.common import trial_labels
 from xb_muscle_ros.diagnose.report.glossary import GLOSSARY
 from xb_muscle_ros.diagnose.report.prose import headline, summary
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
@@ -32,20 +32,6 @@ MOST_ROWS = 40
 """Rows of a table of trials, errors or places; the rest is in `diagnosis.json`, and said to be."""
 # Candidates below this probability are listed in one line.
 _LEAST = 0.05
-
-
-class Shown(NamedTuple):
-    """A figure in its place on the page.
-
-    Attributes:
-        number: from 1 on.
-        source: data URI.
-        figure: with its caption.
-    """
-
-    number: int
-    source: str
-    figure: Figure
 
 
 def as_html(d: Diagnosis, traces: Sequence[TrialTraces]) -> str:
@@ -113,8 +99,8 @@ def _context(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Any]:
     }
 
 
-def _figures(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Shown]:
-    """Figures that there are, numbered in the order of the page."""
+def _figures(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Any]:
+    """Figures that there are with their numbers, from 1 on in the order of the page, and data URIs."""
     drawn = {
         "before_after": figures.draw_before_after(d, traces),
         "probabilities": figures.draw_probabilities(d),
@@ -123,8 +109,8 @@ def _figures(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Shown]:
         "map": figures.draw_map(d),
         "laws": figures.draw_laws(d),
     }
-    there = {name: figure for name, figure in drawn.items() if figure is not None}
-    return {name: Shown(k, _uri(figure.svg), figure) for k, (name, figure) in enumerate(there.items(), start=1)}
+    there = [(name, figure) for name, figure in drawn.items() if figure is not None]
+    return {name: {"number": k, "source": _uri(f.svg), "figure": f} for k, (name, f) in enumerate(there, start=1)}
 
 
 def _uri(svg: str) -> str:
@@ -143,11 +129,11 @@ def _printable(value: object) -> object:
 
 def _units(text: object) -> str:
     """Words of the tool's own, with F0 and L0 as physiologists print them."""
-    told = _TIED.sub("\u00a0", str(do_forceescape(str(_printable(str(text))))))
-    return do_mark_safe(_UNITS.sub(r"\1<sub>0</sub>", told))
+    escaped = str(do_forceescape(str(_printable(str(text)))))
+    return do_mark_safe(_UNITS.sub(r"\1<sub>0</sub>", _TIED.sub("\u00a0", escaped)))
 
 
 def _beyond(n: NuisanceParameter) -> float:
-    """Size of an ordinary error against what is ordinary."""
+    """Size of an ordinary artefact in its prior SDs."""
     ratio = abs(n.value) / n.prior_sd if n.prior_sd > 0.0 else 0.0
     return ratio if ratio == ratio else 0.0
