@@ -174,15 +174,15 @@ and sharpness from rest before stimulation at 0, 3 and 6 mm, which is all that i
 force-length relation (`filament_overlap`, fitted with the rest). By hand, told what is missing: active titin leaves
 1.0 % F0 of the training trials and slow passive viscoelasticity the same (log evidence 46 and 44 beside the base), so
 neither is named; a passive stretch would part them, and is among the held-out trials. The fit with titin predicts
-isometric force at the long length to 6.7 and 10 % F0 (base 14 and 18) and passive ramps to 1.7 and 4.1 (12 and 16), but ramps
-of 27 mm/s to 11 to 16 (6.5 to 7.7): slow ramps leave the strain sensitivity of detachment free to triple."""
+isometric force at the long length to 6.7 and 10 % F0 (base 14 and 18) and passive ramps to 1.7 and 4.1 (12 and 16),
+but ramps of 27 mm/s to 11 to 16 (6.5 to 7.7): slow ramps leave the strain sensitivity of detachment free to triple."""
 _RELAXED = """Cross-bridges are off (no attachment): the base is a soft parallel spring. Training: ramps of 22.5 % L0 in
 0.1, 10 and 100 s; held out: in 1 s. F0 is an assumption (50 kPa)."""
 _BLOCKED = """Training: relaxed ramps of 0.1 and 10 s, blocked ones of 0.1 s at pCa 6.2, 5.8 and 4.4 and of 10 s at 4.4.
 Held out: ramps of 1 and 100 s, relaxed and at pCa 4.4. Calcium changes passive force here with cross-bridges off."""
 _GASTROCNEMIUS = """Training: two isometric contractions, a quick release, two releases with a ramp, one
-stretch-shortening cycle of 5 Hz. Held out: another contraction, release, two ramps and four kinds of cycles. The start is a rat soleus
-fibre, a slower muscle; calcium comes from stimulation. As for the cat, the base has a passive spring that is
+stretch-shortening cycle of 5 Hz. Held out: another contraction, release, two ramps and four kinds of cycles. The start
+is a rat soleus fibre, a slower muscle; calcium comes from stimulation. As for the cat, the base has a passive spring that is
 exponential below its resting length, from rest before stimulation, and a force-length relation."""
 _MOUSE = (Source("mouse_trabecula_titin", "mouse_trabecula_titin/*.csv"),)
 _CASES = (

@@ -66,7 +66,9 @@ def former_sections(page: str) -> list[tuple[str, str]]:
 
 
 def _rows(folder: Path) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = json.loads((folder / "predictions.json").read_text(encoding="utf-8"))["heldout"]
+    found = json.loads((folder / "predictions.json").read_text(encoding="utf-8"))
+    # Files of the former version call them so.
+    rows: list[dict[str, Any]] = found["heldout"] if "heldout" in found else found["concealed"]
     return rows
 
 

@@ -33,8 +33,8 @@ from xb_muscle_ros.models.fibre_file import Fibre
 
 Array = npt.NDArray[np.float64]
 
-# More noise than this hides what is looked for, F0; a base with a residual of more than this share of the force's standard
-# deviation does not describe the recordings.
+# More noise than this hides what is looked for, F0; a base whose residual is more than this share of the force's
+# standard deviation does not describe the recordings.
 _NOISY_F0, _UNDESCRIBED = 0.02, 0.5
 # A residual follows a law that predicts this share of it where it is left out.
 _LAW = 0.2
@@ -223,7 +223,7 @@ def _missing(study: Searched, verdict: Verdict, found: Sequence[Component], afte
             lines.append(f"force with less noise: {100 * noise:.1f} % F0 in fibre {name} hides what is looked for")
         if _rmsd(after[i].residual_f0) > _UNDESCRIBED * float(np.std(recorded.measured)):
             lines.append(
-                f"recordings that the model describes at all: after the fit the residual is half of the force's variation "
+                "recordings that the model describes at all: after the fit the residual is half of the variation of force "
                 f"of fibre {name}; check that channels, units, calcium and fibre belong together"
             )
     if all(t.facts.pca is None or t.facts.pca < 8.0 for s in study.studies for t in s.trials):
