@@ -182,8 +182,8 @@ _BLOCKED = """Training: relaxed ramps of 0.1 and 10 s, blocked ones of 0.1 s at 
 Held out: ramps of 1 and 100 s, relaxed and at pCa 4.4. Calcium changes passive force here with cross-bridges off."""
 _GASTROCNEMIUS = """Training: two isometric contractions, a quick release, two releases with a ramp, one
 stretch-shortening cycle of 5 Hz. Held out: another contraction, release, two ramps and four kinds of cycles. The start
-is a rat soleus fibre, a slower muscle; calcium comes from stimulation. As for the cat, the base has a passive spring that is
-exponential below its resting length, from rest before stimulation, and a force-length relation."""
+is a rat soleus fibre, a slower muscle; calcium comes from stimulation. As for the cat, the base has a passive spring
+that is exponential below its resting length, from rest before stimulation, and a force-length relation."""
 _MOUSE = (Source("mouse_trabecula_titin", "mouse_trabecula_titin/*.csv"),)
 _CASES = (
     *(_pooled(model) for model in _BASES),

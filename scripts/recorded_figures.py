@@ -39,10 +39,9 @@ def write_figure(folder: Path, path: Path) -> Path:
     several = len(d.fibres) > 1
     shown = [_of_shown(t, several, bool(d.named)) for t in _typical(read_traces(folder / outputs.TRACES))]
     with np.load(folder / "predictions.npz") as arrays:
-        hidden = [
-            _of_heldout(arrays, k, row, several)
-            for k, row in enumerate(found["heldout" if "heldout" in found else "concealed"])
-        ]
+        # Files of the former version call them concealed.
+        rows = found["heldout" if "heldout" in found else "concealed"]
+        hidden = [_of_heldout(arrays, k, row, several) for k, row in enumerate(rows)]
     above, below = math.ceil(len(shown) / _COLUMNS), math.ceil(len(hidden) / _COLUMNS)
     with figure(180.0, 42.0 * (above + below) + 8.0) as made:
         axes = made.subplots(above + below, _COLUMNS, squeeze=False)

@@ -223,8 +223,8 @@ def _missing(study: Searched, verdict: Verdict, found: Sequence[Component], afte
             lines.append(f"force with less noise: {100 * noise:.1f} % F0 in fibre {name} hides what is looked for")
         if _rmsd(after[i].residual_f0) > _UNDESCRIBED * float(np.std(recorded.measured)):
             lines.append(
-                "recordings that the model describes at all: after the fit the residual is half of the variation of force "
-                f"of fibre {name}; check that channels, units, calcium and fibre belong together"
+                "recordings that the model describes at all: after the fit the residual of fibre "
+                f"{name} is half of its force's variation; check that channels, units, calcium and fibre belong together"
             )
     if all(t.facts.pca is None or t.facts.pca < 8.0 for s in study.studies for t in s.trials):
         lines.append("a trial without calcium (pCa 9), which tells passive from active effects")
