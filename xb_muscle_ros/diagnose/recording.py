@@ -224,7 +224,7 @@ def _missing(study: Searched, verdict: Verdict, found: Sequence[Component], afte
         if _rmsd(after[i].residual_f0) > _UNDESCRIBED * float(np.std(recorded.measured)):
             lines.append(
                 "recordings that the model describes at all: after the fit the residual of fibre "
-                f"{name} is half of its force's variation; check that channels, units, calcium and fibre belong together"
+                f"{name} is half of its force's variation; check that channels, units, calcium and fibre fit"
             )
     if all(t.facts.pca is None or t.facts.pca < 8.0 for s in study.studies for t in s.trials):
         lines.append("a trial without calcium (pCa 9), which tells passive from active effects")

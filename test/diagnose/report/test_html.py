@@ -155,6 +155,16 @@ def test_numbers_of_the_record_stand_on_the_page() -> None:
         assert told in words, told
 
 
+def test_bounds_and_beaten_benchmarks_are_said() -> None:
+    d = one_fibre().diagnosis
+    words = plain(walked(without_figures(replace(d, p_value_floor=0.002, benchmark_rmsd_f0=0.9))).text)
+    assert "The p-value of the mismatch is ≤ 0.0020" in words
+    assert "benchmark 90 % F0 (worse than the base)" in words
+    before = plain(walked(without_figures(d)).text)
+    assert "The p-value of the mismatch is 0.0020" in before
+    assert "worse than the base" not in before.split("Glossary")[0]
+
+
 def test_where_the_answer_is_the_base_nothing_is_told_twice() -> None:
     text = plain(walked(page("unexplained")).text)
     assert " → " not in text

@@ -118,6 +118,15 @@ def test_a_probability_is_never_shown_larger_than_it_is(value: float) -> None:
         assert (number >= SURE) == (value >= SURE) or math.isclose(value, SURE)
 
 
+def test_a_p_value_at_the_floor_of_the_bootstrap_is_a_bound() -> None:
+    floor = 2.0 / 201.0
+    assert say.p_value(floor, floor) == "≤ 0.010"
+    assert say.p_value(0.5 * floor, floor) == "≤ 0.0050"
+    assert say.p_value(1.5 * floor, floor) == "0.015"
+    assert say.p_value(0.0004) == "< 0.001"
+    assert say.p_value(math.nan, floor) == say.NOTHING
+
+
 @given(st.floats(-2.0, 2.0))
 def test_a_share_is_between_nothing_and_all(value: float) -> None:
     number = int(say.share(value).strip("<> %"))
