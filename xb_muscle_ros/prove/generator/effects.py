@@ -45,10 +45,6 @@ class Effect(NamedTuple):
     apply: Callable[[Truth, float, Shape], Truth]
 
 
-def _none(random: np.random.Generator) -> Shape:
-    return {}
-
-
 def _between(**bounds: tuple[float, float]) -> Callable[[np.random.Generator], Shape]:
     """Draws each constant evenly on a log scale where its bounds are positive, else evenly."""
 
@@ -118,12 +114,9 @@ def _recruited(s: Stimulus, scale: float, shape: Shape) -> Array:
 
 
 def _slipping(truth: Truth, scale: float, shape: Shape) -> Truth:
+    way, unevenness, release_s = shape["way"], shape["unevenness"], shape["release_s"]
     return truth.adding(
-        lambda s, answer: (
-            scale
-            * answer.bound
-            * beside.slipping_friction(s.length, shape["way"], shape["unevenness"], shape["release_s"])
-        )
+        lambda s, answer: scale * answer.bound * beside.slipping_friction(s.length, way, unevenness, release_s)
     )
 
 
@@ -159,15 +152,8 @@ def _cooperative(truth: Truth, scale: float, shape: Shape) -> Truth:
 def _regulated(truth: Truth, scale: float, shape: Shape) -> Truth:
     # As many heads at full activation as before, or the fibre would be too weak to be kept.
     recruiting = 6.17 * (1.0 + shape["JF"] * 0.4 / (1.0 + 0.4 / shape["half_force"]))
-    return truth.changed(
-        {
-            At.F: truth.world.values["f"] * (1.0 + scale / recruiting),
-            At.THICK: float(Thick.FORCE_DEPENDENT),
-            At.J2: scale,
-            At.JF: shape["JF"],
-            At.J_SATURATION: shape["half_force"],
-        }
-    )
+    changes = {At.F: truth.world.values["f"] * (1.0 + scale / recruiting), At.THICK: float(Thick.FORCE_DEPENDENT)}
+    return truth.changed({**changes, At.J2: scale, At.JF: shape["JF"], At.J_SATURATION: shape["half_force"]})
 
 
 # Q10 of the rates: attachment and detachment of heads, both filaments.
@@ -236,7 +222,7 @@ _ROWS = (
         _between(steepness=(5.0, 20.0), **_TITIN), _beside(_stiffened),
     ),
     Effect(
-        Name.LENGTH_DEPENDENT_ACTIVATION.value, "pCa50 per length, 1/L0", _ALL, 1.5, 12.0, _none,
+        Name.LENGTH_DEPENDENT_ACTIVATION.value, "pCa50 per length, 1/L0", _ALL, 1.5, 12.0, _between(),
         _on_input("calcium", _sensitivity),
     ),
     Effect(
@@ -260,14 +246,14 @@ _ROWS = (
         500.0, 6000.0, _between(strain=(1.0, 3.0), steepness=(4.0, 10.0), rebind=(500.0, 3000.0)),
         _set(At.TEAR_RATE, strain=At.TEAR_STRAIN, steepness=At.TEAR_STEEPNESS, rebind=At.REBIND_RATE),
     ),
-    Effect(Name.NONLINEAR_CROSSBRIDGE.value, "curvature, 1", _ALL, 0.1, 0.8, _none, _set(At.HEAD_CURVATURE)),
+    Effect(Name.NONLINEAR_CROSSBRIDGE.value, "curvature, 1", _ALL, 0.1, 0.8, _between(), _set(At.HEAD_CURVATURE)),
     Effect(Name.HALF_SARCOMERE_SPREAD.value, "SD of strength, 1", _COMPLIANT, 0.05, 0.2, _draw_spread, _spread),
     Effect(
         Name.SERIES_COMPLIANCE.value, "length scale of the spring, power strokes",
         ("3state_coop_rigid", "2state_coop_rigid"), 1.0, 8.0, _between(force=(0.1, 0.4)), _compliance,
     ),
     Effect(
-        Name.THIN_FILAMENT_COOPERATIVITY.value, "affinity per bound head, decades", ("2state",), 0.5, 3.0, _none,
+        Name.THIN_FILAMENT_COOPERATIVITY.value, "affinity per bound head, decades", ("2state",), 0.5, 3.0, _between(),
         _cooperative,
     ),
     Effect(
@@ -279,8 +265,8 @@ _ROWS = (
         _warm,
     ),
     Effect(
-        Name.PHOSPHATE.value, "detachment before the stroke, 1/s", ("3state_coop", "2state_coop"), 30.0, 400.0, _none,
-        _set(At.PHOSPHATE_RATE),
+        Name.PHOSPHATE.value, "detachment before the stroke, 1/s", ("3state_coop", "2state_coop"), 30.0, 400.0,
+        _between(), _set(At.PHOSPHATE_RATE),
     ),
 )  # fmt: skip
 _OUTSIDE = (
@@ -300,7 +286,7 @@ _OUTSIDE = (
         "outside:series_creep", "creep per force, power strokes", _COMPLIANT, 6.0, 15.0, _between(tau_s=(0.4, 2.0)),
         _set(At.CREEP, tau_s=At.CREEP_TIME),
     ),
-    Effect("outside:damage_by_stretch", "heads lost per stretch, 1/L0", _ALL, 0.5, 8.0, _none, _damaged),
+    Effect("outside:damage_by_stretch", "heads lost per stretch, 1/L0", _ALL, 0.5, 8.0, _between(), _damaged),
 )  # fmt: skip
 
 EFFECTS: Mapping[str, Effect] = MappingProxyType({row.label: row for row in (*_ROWS, *_OUTSIDE)})
