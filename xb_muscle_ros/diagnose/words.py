@@ -4,84 +4,50 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import NamedTuple
 
-from xb_muscle_ros.diagnose.names import FAMILY, Name
-
-
-class Words(NamedTuple):
-    """Of one thing that a diagnosis may name.
-
-    Attributes:
-        name: how a sentence calls it.
-        meaning: what it is, in a line that follows a colon.
-    """
-
-    name: str
-    meaning: str
-
-
-_WORDS: Mapping[Name, Words] = {
-    Name.VISCOUS_DRAG: Words("viscous drag", "a force proportional to the speed of stretch"),
-    Name.PASSIVE_VISCOELASTICITY: Words(
-        "passive viscoelasticity",
-        "springs with dashpots beside the cross-bridges, so that force decays after a stretch",
-    ),
-    Name.WEAKLY_BOUND_HEADS: Words(
-        "weakly bound heads", "heads that bind and let go quickly and hold for a moment when the fibre is stretched"
-    ),
-    Name.FILAMENT_FRICTION: Words(
-        "friction of bound heads",
-        "links that bound heads make are elastic for a short way, slip, and take time to form anew",
-    ),
-    Name.ACTIVE_TITIN: Words(
-        "active titin", "a spring that engages when the fibre is activated and is stretched from there on"
-    ),
-    Name.STATIC_CALCIUM_STIFFNESS: Words(
-        "static calcium-dependent stiffness", "a spring whose stiffness follows calcium, not force"
-    ),
-    Name.LENGTH_DEPENDENT_ACTIVATION: Words(
-        "length-dependent activation", "a longer fibre is more sensitive to calcium"
-    ),
-    Name.LATTICE_SPACING: Words(
-        "lattice spacing", "heads attach faster when the fibre is longer and its lattice tighter"
-    ),
-    Name.FILAMENT_OVERLAP: Words("filament overlap", "the number of heads within reach changes with length"),
-    Name.STRAIN_RECRUITED_HEADS: Words(
-        "heads recruited by strain", "stretch wakes heads that were resting on the thick filament"
-    ),
-    Name.PERSISTENT_THICK_FILAMENT: Words(
-        "persistent thick filament",
-        "heads that force has woken stay awake after force is lost, and go to rest more slowly than the model has it",
-    ),
-    Name.FORCIBLE_DETACHMENT: Words(
-        "forcible detachment", "heads stretched too far are torn off and bind again quickly"
-    ),
-    Name.NONLINEAR_CROSSBRIDGE: Words(
-        "non-linear cross-bridges", "the stiffness of a head changes with how far it is stretched"
-    ),
-    Name.HALF_SARCOMERE_SPREAD: Words(
-        "uneven half-sarcomeres", "stronger half-sarcomeres shorten at the cost of weaker ones in series"
-    ),
-    Name.SERIES_COMPLIANCE: Words("series compliance", "a spring in series takes up part of the length change"),
-    Name.THIN_FILAMENT_COOPERATIVITY: Words(
-        "thin-filament cooperativity", "bound heads and active sites help their neighbours to become active"
-    ),
-    Name.THICK_FILAMENT_COOPERATIVITY: Words(
-        "thick-filament cooperativity", "force wakes heads that were resting on the thick filament"
-    ),
-    Name.TEMPERATURE: Words("temperature", "the recordings were made warmer or colder than the model assumes"),
-    Name.PHOSPHATE: Words("phosphate", "phosphate in the solution lets heads detach before they have done their work"),
-    Name.PCA_SHIFT: Words("pCa shift", "a solution had more or less free calcium than its label says"),
-    Name.RUN_DOWN: Words("run-down", "the fibre lost force from trial to trial"),
-    Name.FORCE_OFFSET: Words("force offset", "the transducer did not read zero at zero force"),
-    Name.FORCE_DRIFT: Words("force drift", "the reading of the transducer crept during a trial"),
-    Name.LENGTH_GAIN: Words("length gain", "the length changes were larger or smaller than recorded"),
-    Name.TIME_SHIFT: Words("time shift", "force and length were recorded out of step"),
-    Name.TRANSDUCER_LAG: Words("transducer lag", "the transducer follows force with a delay"),
+# Names that are not their identifier with spaces.
+_NAMES: Mapping[str, str] = {
+    "filament_friction": "friction of bound heads",
+    "static_calcium_stiffness": "static calcium-dependent stiffness",
+    "length_dependent_activation": "length-dependent activation",
+    "strain_recruited_heads": "heads recruited by strain",
+    "nonlinear_crossbridge": "non-linear cross-bridges",
+    "half_sarcomere_spread": "uneven half-sarcomeres",
+    "thin_filament_cooperativity": "thin-filament cooperativity",
+    "thick_filament_cooperativity": "thick-filament cooperativity",
+    "pca_shift": "pCa shift",
+    "run_down": "run-down",
+    "base": "the base model",
+}
+_MEANINGS: Mapping[str, str] = {
+    "viscous_drag": "a force proportional to the speed of stretch",
+    "passive_viscoelasticity": "springs with dashpots beside the cross-bridges; force decays after a stretch",
+    "weakly_bound_heads": "heads that bind and let go quickly and hold for a moment when the fibre is stretched",
+    "filament_friction": "links of bound heads are elastic for a short way, slip, and take time to form anew",
+    "active_titin": "a spring that engages when the fibre is activated and is stretched from there on",
+    "static_calcium_stiffness": "a spring whose stiffness follows calcium, not force",
+    "length_dependent_activation": "a longer fibre is more sensitive to calcium",
+    "lattice_spacing": "heads attach faster when the fibre is longer and its lattice tighter",
+    "filament_overlap": "the number of heads within reach changes with length",
+    "strain_recruited_heads": "stretch wakes heads that were resting on the thick filament",
+    "persistent_thick_filament": "heads that force has woken go to rest more slowly than the model has it",
+    "forcible_detachment": "heads stretched too far are torn off and bind again quickly",
+    "nonlinear_crossbridge": "the stiffness of a head changes with how far it is stretched",
+    "half_sarcomere_spread": "stronger half-sarcomeres shorten at the cost of weaker ones in series",
+    "series_compliance": "a spring in series takes up part of the length change",
+    "thin_filament_cooperativity": "bound heads and active sites help their neighbours to become active",
+    "thick_filament_cooperativity": "force wakes heads that were resting on the thick filament",
+    "temperature": "the recordings were made warmer or colder than the model assumes",
+    "phosphate": "phosphate in the solution lets heads detach before they have done their work",
+    "pca_shift": "a solution had more or less free calcium than its label says",
+    "run_down": "the fibre lost force from trial to trial",
+    "force_offset": "the transducer did not read zero at zero force",
+    "force_drift": "the reading of the transducer crept during a trial",
+    "length_gain": "the length changes were larger or smaller than recorded",
+    "time_shift": "force and length were recorded out of step",
+    "transducer_lag": "the transducer follows force with a delay",
 }
 _FAMILIES: Mapping[str, str] = {
-    "parallel_viscoelasticity": "parallel viscoelasticity",
     "weak_binding": "weak binding and friction",
     "calcium_dependent_elasticity": "calcium-dependent elasticity",
     "length_dependence": "length dependence of activation and attachment",
@@ -90,7 +56,6 @@ _FAMILIES: Mapping[str, str] = {
     "heterogeneity": "heterogeneity of half-sarcomeres",
     "compliance": "series compliance",
     "rates": "temperature and chemistry",
-    "calcium_of_solutions": "calcium of the solutions",
     "force_scale": "scale of force",
     "force_zero": "zero of force",
     "length_scale": "scale of length",
@@ -104,44 +69,22 @@ SCALES: Mapping[str, str] = MappingProxyType(
         "force": "scales with force",
     }
 )
-"""What a remainder scales with, after its subject."""
-# The scale for likelihood of Mastrandrea et al. 2010 (guidance note of the IPCC on uncertainties): lower limits.
-_LIKELY = (
-    (0.99, "virtually certain"),
-    (0.90, "very likely"),
-    (0.66, "likely"),
-    (0.33, "about as likely as not"),
-    (0.10, "unlikely"),
-    (0.0, "very unlikely"),
-)
-
-
-def parts(name: str) -> list[str]:
-    """Names in a pair written ``a+b``; a single name alone."""
-    return [part for part in (piece.strip() for piece in name.split("+")) if part]
+"""What a residual scales with, after its subject."""
 
 
 def human(name: str) -> str:
-    """A mechanism, fault or pair as a sentence calls it."""
-    if name == "base":
-        return "the base model"
-    return " with ".join(_one(part).name for part in parts(name)) or name
+    """A mechanism or artefact as a sentence calls it."""
+    return _NAMES.get(name, name.replace("_", " "))
 
 
 def meaning(name: str) -> str:
     """What it is, in one line; empty where nothing is known."""
-    return "; ".join(m for m in (_one(part).meaning for part in parts(name)) if m)
+    return _MEANINGS.get(name, "")
 
 
 def family_words(family: str) -> str:
     """A family as a sentence calls it."""
     return _FAMILIES.get(family, family.replace("_", " "))
-
-
-def family_of(name: str) -> str | None:
-    """Family of a known name, else None."""
-    known = {str(n.value): family for n, family in FAMILY.items()}
-    return known.get(name)
 
 
 def phase_words(phase: str) -> str:
@@ -154,11 +97,6 @@ def joined(items: Sequence[str], last: str = "and") -> str:
     if len(items) < 2:
         return "".join(items)
     return f"{', '.join(items[:-1])} {last} {items[-1]}"
-
-
-def likely(share: float) -> str:
-    """A probability in words."""
-    return next(words for least, words in _LIKELY if share >= least or least == 0.0)
 
 
 def digits(value: float, significant: int = 2) -> str:
@@ -178,9 +116,14 @@ def percent(value_f0: float) -> str:
     return digits(100.0 * value_f0)
 
 
-def quantity(value: float, unit: str | None) -> str:
+def quantity(value: float, unit: str | None, significant: int = 3) -> str:
     """A value with its unit; ``1`` is none."""
-    return digits(value, 3) + ("" if unit in (None, "", "1") else f" {unit}")
+    return digits(value, significant) + after_number(unit)
+
+
+def after_number(unit: str | None) -> str:
+    """A unit as it follows a number; ``1`` is none."""
+    return "" if unit in (None, "", "1") else f" {unit}"
 
 
 def chance(p_value: float) -> str:
@@ -191,10 +134,3 @@ def chance(p_value: float) -> str:
         if p_value * repeats >= 1.0:
             return f"in about {round(p_value * repeats)} of {repeats} repeats"
     return "in fewer than 1 of 10000 repeats"
-
-
-def _one(name: str) -> Words:
-    try:
-        return _WORDS[Name(name)]
-    except ValueError:
-        return Words(name.replace("_", " "), "")

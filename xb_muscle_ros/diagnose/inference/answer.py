@@ -130,7 +130,7 @@ def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Compon
         OfFibre(
             fibre=system.fibre.name,
             inclusion_probability=judged.probability(group, i),
-            share_of_mismatch=unique(e, chosen, without, judged.noise_f0, i) if own is not None else 0.0,
+            ablation_loss=unique(e, chosen, without, judged.noise_f0, i) if own is not None else 0.0,
             heldout_gain=judged.heldout.gain(chosen, without, i) if own is not None else None,
             parameters=() if best is None else _of_one(judged, best, lead, i),
             replication=judged.replication(group, i),
@@ -143,7 +143,7 @@ def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Compon
         family=FAMILY[lead],
         members=tuple(n.value for n in sorted(group, key=lambda n: (n is not lead, -judged.averages.including([n])))),
         inclusion_probability=probability,
-        share_of_mismatch=share,
+        ablation_loss=share,
         heldout_gain=gain,
         parameters=() if best is None else _of_all(judged, best, lead),
         not_separable_from=tuple(n.value for n in rivals),

@@ -1,4 +1,4 @@
-"""What the answer leaves: residual by trial and phase before and after, and the laws that residuals follow."""
+"""Residual of base and answer by trial and phase."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from xb_muscle_ros.diagnose.report.figures.common import (
     wrapped,
 )
 from xb_muscle_ros.diagnose.report.phrases import ONE_WAY, changed
+from xb_muscle_ros.diagnose.residual import ResidualMap
 from xb_muscle_ros.diagnose.result import Diagnosis
 from xb_muscle_ros.diagnose.words import phase_words
 from xb_muscle_ros.plotting.style import figure
@@ -31,16 +32,16 @@ _ROW_MM = 5.2
 # Below this lightness of a cell its numbers are white; colours reach at least so far (% F0).
 _DARK, _LEAST = 0.5, 0.3
 
-Table = Mapping[str, list[object]]
 Cells = dict[tuple[Key, str], tuple[float, float, bool]]
 
 
 def draw_map(d: Diagnosis) -> Figure | None:
     """Two maps side by side, base and answer; None where there is none."""
     maps = [cells(d.map_before), *([cells(d.map_after)] if changed(d) else [])]
-    phases = _phases(d, maps[0])
     if not maps[0]:
         return None
+    known = {phase for _, phase in maps[0]}
+    phases = [p for p in dict.fromkeys(p for of in d.map_before.values() for p in of.phases) if p in known]
     worst = {t: max((maps[0].get((key(t), p), (0.0, 0.0, False))[0] for p in phases), default=0.0) for t in d.trials}
     rows = [t for t in by_activation(d.trials) if any((key(t), p) in maps[0] for p in phases)]
     shown = sorted(rows, key=lambda t: -worst[t])[:_TRIALS]
@@ -75,31 +76,14 @@ def _caption(d: Diagnosis, framed: bool, shown: int, columns: int, phases: Seque
     )
 
 
-def cells(maps: Mapping[str, Table]) -> Cells:
+def cells(maps: Mapping[str, ResidualMap]) -> Cells:
     """Root mean square, mean (F0) and whether it counts, by trial and phase."""
-    found: Cells = {}
-    for fibre, table in maps.items():
-        trials, phases = table.get("trials", []), table.get("phases", [])
-        grids = [table.get(name) or [] for name in ("rms_f0", "mean_f0", "counts")]
-        for i, trial in enumerate(trials):
-            for j, phase in enumerate(phases):
-                rms, mean, counts = (_at(grid, i, j) for grid in grids)
-                if isinstance(rms, (int, float)) and math.isfinite(rms):
-                    centre = float(mean) if isinstance(mean, (int, float)) else math.nan
-                    found[(fibre, str(trial)), str(phase)] = (float(rms), centre, bool(counts))
-    return found
-
-
-def _at(grid: Sequence[object], i: int, j: int) -> object:
-    row = grid[i] if i < len(grid) else None
-    return row[j] if isinstance(row, (list, tuple)) and j < len(row) else None
-
-
-def _phases(d: Diagnosis, of: Cells) -> list[str]:
-    """All phases, as the fibres' maps list them."""
-    known = {phase for _, phase in of}
-    listed = [str(p) for table in d.map_before.values() for p in table.get("phases", [])]
-    return [p for p in dict.fromkeys(listed) if p in known]
+    return {
+        ((fibre, trial), phase): (rms, math.nan if mean is None else mean, counts)
+        for fibre, of in maps.items()
+        for trial, phase, rms, mean, counts in of.cells()
+        if math.isfinite(rms)
+    }
 
 
 def _largest(of: Cells, phases: Sequence[str]) -> list[str]:

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from xb_muscle_ros.diagnose.component import Component, Kind
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.figures.common import (
-    DATA_LINE,
-    LINES,
     WIDTH_MM,
     Figure,
     finite,
     key,
+    plot_force,
+    plot_residual,
+    same_scale,
     shown_of,
     svg,
     thinned,
@@ -45,7 +44,7 @@ def chosen_trials(d: Diagnosis, traces: Sequence[TrialTraces]) -> list[tuple[OfT
     return [(t, of[key(t)]) for t in picked]
 
 
-def draw_parts(d: Diagnosis, traces: Sequence[TrialTraces]) -> Figure | None:
+def draw_contributions(d: Diagnosis, traces: Sequence[TrialTraces]) -> Figure | None:
     """Columns of trials: length, force, one panel for each component, residual; None without traces."""
     chosen = chosen_trials(d, traces)
     if not chosen:
@@ -60,8 +59,8 @@ def draw_parts(d: Diagnosis, traces: Sequence[TrialTraces]) -> Figure | None:
         for column, (row, t) in zip(axes.T, chosen, strict=True):
             handles += _column(column, t, shown, 1 + say.changed(d))
             column[0].set_title(wrapped(labels[key(row)], 26, 1), loc="left", fontsize=7)
-        _same_scale(axes[2:-1])
-        _same_scale(axes[-1:])
+        same_scale(axes[2:-1])
+        same_scale(axes[-1:])
         _labels(axes, shown)
         made.legend(handles=unique(handles), loc="outside upper center", ncols=3, frameon=False)
         return Figure(
@@ -93,13 +92,10 @@ def _caption(d: Diagnosis, shown: Sequence[Component], parts: int, trials: int) 
 def _column(column: Sequence[Any], t: TrialTraces, shown: Sequence[Component], models: int) -> list[Any]:
     column[0].plot(*thinned(t.time_s, 100.0 * t.length_l0), color="black", linewidth=0.9)
     column[0].margins(y=0.15)
-    handles = column[1].plot(*thinned(t.time_s, t.measured_f0), **DATA_LINE)
-    for axis in column[2:]:
-        axis.axhline(0.0, color="black", linewidth=0.5)
-    for values, look in zip((t.before_f0, t.after_f0)[:models], LINES[:models], strict=True):
-        handles += column[1].plot(*thinned(t.time_s, values), **look)
-        column[-1].plot(*thinned(t.time_s, 100.0 * (t.measured_f0 - values)), **look)
+    both = (t.before_f0, t.after_f0)[:models]
+    plot_residual(column[-1], t, both)
     for axis, c in zip(column[2:-1], shown, strict=True):
+        axis.axhline(0.0, color="black", linewidth=0.5)
         if c.name not in t.without_f0:
             axis.text(0.5, 0.5, "not in this fibre", transform=axis.transAxes, ha="center", va="center", fontsize=7)
             continue
@@ -110,14 +106,7 @@ def _column(column: Sequence[Any], t: TrialTraces, shown: Sequence[Component], m
             alpha=0.35 if mechanism else 1.0, hatch=None if mechanism else "/////", linewidth=0.0,
         )  # fmt: skip
         axis.plot(time_s, adds, color=MODEL if mechanism else SECOND, linewidth=0.9)
-    return list(handles)
-
-
-def _same_scale(rows: Any) -> None:
-    """One scale around zero for all panels of some rows."""
-    ends = [abs(end) for axis in np.ravel(rows) for end in axis.get_ylim()]
-    for axis in np.ravel(rows):
-        axis.set_ylim(-max(ends), max(ends))
+    return plot_force(column[1], t, both)
 
 
 def _labels(axes: Any, shown: Sequence[Component]) -> None:
