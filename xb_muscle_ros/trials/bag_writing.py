@@ -104,7 +104,7 @@ def _series(trial: Trial, simulated: Simulated | None, where: str) -> list[_Seri
         raise UserError(f"bag {where}: the trial's fibre has no name; give it one")
 
     def series(topic: str, time_s: Array, names: list[str], **fields: Array) -> _Series:
-        columns = {field: values.reshape(len(values), -1) for field, values in fields.items()}
+        columns = {field: values.reshape(len(values), len(names)) for field, values in fields.items()}
         stamps = _stamps(time_s, tuple(column for values in columns.values() for column in values.T), topic, where)
         return _Series(topic, stamps, names, columns)
 
