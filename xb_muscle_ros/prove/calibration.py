@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -68,29 +68,19 @@ def reliability(cases: Iterable[Iterable[Stated]], bins: int = BINS) -> list[dic
 
 def of_composites(judged: Sequence[JudgedComposite]) -> list[Score]:
     """Calibration errors of inclusion probabilities, as they are stated and in four other ways."""
-    error_of = "expected calibration error"
+    rows: dict[str, tuple[str, Callable[[JudgedComposite], list[Stated]]]] = {
+        "calibration": (" of inclusion probabilities, as stated", lambda j: as_stated(j.statements)),
+        "calibration_components": (", every component by its family", lambda j: by_family(j.statements)),
+        "calibration_families": (", one statement for each family of a case", lambda j: as_families(j.statements)),
+        "calibration_exact": (
+            ", by name (components of one name)", lambda j: as_stated(s for s in j.statements if s.single)
+        ),
+        "calibration_artefacts": (" of artefacts, by family", lambda j: by_family(j.artefact_statements)),
+    }  # fmt: skip
     return [
-        calibration_score(
-            "calibration", f"{error_of} of inclusion probabilities, as stated",
-            [as_stated(j.statements) for j in judged], 0.05,
-        ),
-        calibration_score(
-            "calibration_components", f"{error_of}, every component by its family",
-            [by_family(j.statements) for j in judged],
-        ),
-        calibration_score(
-            "calibration_families", f"{error_of}, one statement for each family of a case",
-            [as_families(j.statements) for j in judged],
-        ),
-        calibration_score(
-            "calibration_exact", f"{error_of}, by name (components of one name)",
-            [as_stated(s for s in j.statements if s.single) for j in judged],
-        ),
-        calibration_score(
-            "calibration_artefacts", f"{error_of} of artefacts, by family",
-            [by_family(j.artefact_statements) for j in judged],
-        ),
-    ]  # fmt: skip
+        calibration_score(name, "expected calibration error" + of, [stated(j) for j in judged], bar)
+        for (name, (of, stated)), bar in zip(rows.items(), (0.05, None, None, None, None), strict=True)
+    ]
 
 
 def as_stated(statements: Iterable[JudgedName]) -> list[Stated]:
