@@ -13,6 +13,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.simulation.offline import outputs
 
 Array = npt.NDArray[np.float64]
 
@@ -66,9 +67,7 @@ def worse_left_out(rows: Sequence[OfTrial]) -> list[str]:
 def _force(fibre: Fibre, trial: FitTrial, length: Array, calcium: Array, slower: float) -> Array | None:
     """Force with times stretched by a factor, F0; None where the model has no solution."""
     try:
-        muscle = Muscle(fibre)
-        state = muscle.settle(float(length[0]), float(calcium[0]))
-        return muscle.outputs_of(muscle.run(state, trial.dt_s * slower, length, calcium))["force_f0"]
+        return outputs(Muscle(fibre), trial.dt_s * slower, length, calcium)["force_f0"]
     except UserError:
         return None
 

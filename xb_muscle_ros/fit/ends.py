@@ -63,9 +63,7 @@ def of_parameters(coordinates: tuple[Coordinate, ...]) -> Array:
 
     Those of measurement artefacts are left out: how large these are is known from elsewhere.
     """
-    sds = np.array([c.prior_sd if c.group is None else np.inf for c in coordinates])
-    precision: Array = np.where(np.isfinite(sds), sds**-2.0, 0.0)
-    return precision
+    return np.array([c.prior_sd**-2.0 if c.group is None else 0.0 for c in coordinates])
 
 
 def _prior(objective: Objective, z: Array) -> float:

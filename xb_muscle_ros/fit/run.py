@@ -117,7 +117,7 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
         if settings.level is None:
             settled = True
             break
-        sides, better = _profiles(found.problem, best, scale, settings.level, options)
+        sides, better = _profiles(found.problem, best, scale, shape, settings.level, options)
         settled = better is None
         if better is None:
             break
@@ -130,8 +130,7 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
 def profile_task(task: Mapping[str, Any]) -> dict[str, Any]:
     """One side of one profile."""
     objective = Objective(Training(Problem.from_json(task["problem"])), Scale(*task["scale"]))
-    best = solution_from_json(task["best"])
-    shape = curvature(objective, best.z)
+    best, shape = solution_from_json(task["best"]), Curvature(*(np.array(row) for row in task["shape"]))
     return profile_side(objective, best, task["index"], task["up"], shape, task["level"])._asdict()
 
 
@@ -178,11 +177,12 @@ def _descended(tasks: Sequence[Mapping[str, Any]], options: Options) -> tuple[li
 
 
 def _profiles(
-    problem: Problem, best: Solution, scale: Scale, level: float, options: Options
+    problem: Problem, best: Solution, scale: Scale, shape: Curvature, level: float, options: Options
 ) -> tuple[dict[int, tuple[Side, Side]], Array | None]:
     """Both sides of every model parameter's profile, or a better point that one of them met."""
     chosen = [j for j, c in enumerate(problem.coordinates) if c.group is None]
     task = {"problem": problem.to_json(), "best": solution_to_json(best), "scale": list(scale), "level": level}
+    task["shape"] = [row.tolist() for row in shape]
     tasks = [{**task, "index": j, "up": up} for j in chosen for up in (False, True)]
     rows = run(profile_task, tasks, replace(options, label="profiles"))
     sides = [Side(r["end"], r["ended_by"], [(x, y) for x, y in r["points"]], r["better"]) for r in rows]

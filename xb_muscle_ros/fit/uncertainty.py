@@ -1,10 +1,10 @@
-"""How well a fit knows its coordinates: covariance, correlation, and intervals by profile likelihood.
+"""How well a fit knows its coordinates: covariance, correlation, and profile likelihood intervals.
 
-Samples count as correlated (see `noise`): the covariance is the sandwich H^-1 V H^-1 of curvature H and covariance V of
-the score, and a profile's threshold is scaled by what this makes of the coordinate's variance, as for composite
-likelihoods (Varin, Reid and Firth, Statistica Sinica 21 (2011) 5-42). Where model and data differ by more than noise
-the residuals are larger and slower, and so the intervals wider; but no interval knows of an error that all trials
-share.
+Samples count as correlated (see `scores.noise.residual`): the covariance is the sandwich H^-1 V H^-1 of curvature H and
+covariance V of the score, and a profile's threshold is scaled by what this makes of the coordinate's variance, as for
+composite likelihoods (Varin, Reid and Firth, Statistica Sinica 21 (2011) 5-42). Where model and data differ by more
+than noise the residuals are larger and slower, and so the intervals wider; but no interval knows of an error that all
+trials share.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ import numpy.typing as npt
 from scipy.stats import chi2
 
 from xb_muscle_ros.fit.ends import BOUND, UNSETTLED, of_parameters, profile_end
-from xb_muscle_ros.fit.noise import noise_autocovariances, score_covariance
+from xb_muscle_ros.fit.linear_fit import LinearFit
+from xb_muscle_ros.fit.noise import noise_at
 from xb_muscle_ros.fit.solve import Objective, Solution, descend
 
 Array = npt.NDArray[np.float64]
@@ -47,31 +48,14 @@ class Curvature(NamedTuple):
 def curvature(objective: Objective, z: Array) -> Curvature:
     """Curvature and covariance at a point."""
     training = objective.training
-    (slopes, of_features), weights = training.slopes(z), objective.weights()
-    residual = training.force(z) - training.measured
-    sds = np.array([c.prior_sd for c in training.problem.coordinates])
-    prior = np.diag(np.where(np.isfinite(sds), sds**-2.0, 0.0))
-    weighted = slopes * weights[:, None]
+    slopes = of_force, of_features = training.slopes(z)
     # Features and priors are taken at their word: independent, with the standard deviations they come with.
-    certain = of_features.T @ of_features + prior
-    h = weighted.T @ weighted + certain
-    here = training.slices()
-    score = [slopes[s] * weights[s][:, None] ** 2 for s in here]
-    # In units of each coordinate's own curvature, so that the inverse does not depend on units.
-    unit = np.sqrt(np.maximum(np.diag(h), 1e-12))
-    values, vectors = np.linalg.eigh(h / np.outer(unit, unit))
-    seen = values > 1e-8 * values[-1]
-    inverse = (vectors / np.where(seen, values, np.inf)) @ vectors.T / np.outer(unit, unit)
-
-    def left(noise: Array) -> Array:
-        """What the fit, taken as linear, leaves of noise."""
-        taken: Array = slopes @ (inverse @ (weighted.T @ (noise * weights[:, None])))
-        return noise - taken
-
-    noise = noise_autocovariances([residual[s] for s in here], left)
-    v = score_covariance(score, noise, z.size) + certain
+    certain = of_features.T @ of_features + np.diag(training.problem.information)
+    fit = LinearFit(of_force, objective.weights(), certain)
+    noise = noise_at(training, z, slopes)
+    v = certain + sum(noise.covariance_of_sums(i, fit.score[s]) for i, s in enumerate(training.slices()))
+    inverse, weak = fit.inverse, fit.weak
     covariance = inverse @ v @ inverse
-    weak = np.sqrt(np.sum(vectors[:, ~seen] ** 2, axis=1)) > 0.1
     inflation = np.diag(covariance) / np.maximum(np.diag(inverse), 1e-300)
     # Along the direction in which a coordinate's profile goes.
     along = inverse / np.sqrt(np.maximum(np.diag(inverse), 1e-300))

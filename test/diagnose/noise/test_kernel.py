@@ -15,11 +15,15 @@ from hypothesis import strategies as st
 from xb_muscle_ros.diagnose.noise.cells import Residual
 from xb_muscle_ros.diagnose.noise.flexible import flexible_fit
 from xb_muscle_ros.diagnose.noise.kernel import law, memories
-from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.linear_fit import LinearFit
 
 Array = npt.NDArray[np.float64]
 Change = Callable[[Any, Array], Array]
+
+
+def nothing_fitted(samples: int) -> LinearFit:
+    return LinearFit(np.zeros((samples, 0)), np.ones(samples), np.zeros(0))
 
 
 def _rng(seed: int) -> np.random.Generator:
@@ -119,7 +123,7 @@ def test_nothing_left_has_no_law(long_study: Any, scalings: dict[str, list[Array
 def test_one_trial_without_scalings(long_study: Any) -> None:
     first = long_study.residuals[0]
     alone = first._replace(value_f0=drag(first, np.empty(0)))
-    found = law([alone], LinearFit.nothing(first.time_s.size), {})
+    found = law([alone], nothing_fitted(first.time_s.size), {})
     assert found is not None
     assert found.scales_with == "constant"
     assert found.time_constant_s < 0.004

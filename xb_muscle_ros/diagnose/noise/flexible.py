@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.noise.cells import Residual
 from xb_muscle_ros.diagnose.noise.kernel import driven, scales
-from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.linear_fit import LinearFit
 
 Array = npt.NDArray[np.float64]
 
@@ -80,7 +80,7 @@ def flexible_fit(
         own = own[:, size > 1e-12] / size[size > 1e-12]
         columns.append(own)
         owner += [name] * own.shape[1]
-    return _chosen(fit.left(np.column_stack(columns)), np.array(owner), target, train, held)
+    return _chosen(fit.residual(np.column_stack(columns)), np.array(owner), target, train, held)
 
 
 def _terms(r: Residual) -> Array:

@@ -18,8 +18,8 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import nnls
 
 from xb_muscle_ros.diagnose.noise.cells import Residual, check
-from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.linear_fit import LinearFit
 
 Array = npt.NDArray[np.float64]
 
@@ -133,7 +133,7 @@ def law(
     for name, scale in known.items():
         columns = plain * scale[:, None]
         sizes = np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300)
-        products = _Products(fit.left(columns / sizes), target, edges)
+        products = _Products(fit.residual(columns / sizes), target, edges)
         for sign in (1, -1):
             share = products.explained(sign)
             shares[name] = max(share, shares.get(name, -math.inf))

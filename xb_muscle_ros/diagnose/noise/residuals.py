@@ -11,15 +11,16 @@ import numpy.typing as npt
 from xb_muscle_ros.diagnose.noise.cells import Residual
 from xb_muscle_ros.diagnose.noise.flexible import flexible_fit
 from xb_muscle_ros.diagnose.noise.kernel import Law, law
-from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.diagnose.noise.significance import Significance, significance
 from xb_muscle_ros.diagnose.search.descent import Fit
 from xb_muscle_ros.diagnose.search.system import System
 from xb_muscle_ros.errors import naming
+from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.scores.noise.model import NoiseModel
+from xb_muscle_ros.simulation.offline import outputs
 from xb_muscle_ros.trials.trial import Trial
 
 Array = npt.NDArray[np.float64]
@@ -128,7 +129,7 @@ class Recordings:
                 return None
             weights = around.fit.weights * np.repeat([0.0 if h else 1.0 for h in held], [r.time_s.size for r in found])
             without = LinearFit(around.fit.slopes, weights, around.fit.prior)
-            value = without.left(around.residual_f0[:, None])[:, 0]
+            value = without.residual(around.residual_f0[:, None])[:, 0]
             edges = np.cumsum([0, *(r.time_s.size for r in found)])
             here = [r._replace(value_f0=value[a:b]) for r, a, b in zip(found, edges[:-1], edges[1:], strict=True)]
             predicted = flexible_fit(here, held, without, scalings).predicted_f0
@@ -145,8 +146,7 @@ def _scalings(problem: Problem) -> Mapping[str, list[Array]]:
     activation, calcium, force = [], [], []
     for trial in problem.trials:
         with naming(f"trial {trial.name}"):
-            state = muscle.settle(float(trial.length_l0[0]), float(trial.calcium_um[0]))
-            out = muscle.outputs_of(muscle.run(state, trial.dt_s, trial.length_l0, trial.calcium_um))
+            out = outputs(muscle, trial.dt_s, trial.length_l0, trial.calcium_um)
         activation.append(np.interp(trial.force_time_s, trial.time_s, out["n_on"]))
         force.append(np.interp(trial.force_time_s, trial.time_s, out["force_ce_f0"]))
         given = np.interp(trial.force_time_s, trial.time_s, trial.calcium_um)

@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.noise.cells import Cell, Residual, cut, exceeding, mean, phase_names, rms
-from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.scores.noise.model import NoiseModel
 
 Array = npt.NDArray[np.float64]
@@ -197,7 +197,7 @@ def null_residuals(
     chosen = noise.of([r.trial for r in residuals])
     random = np.random.default_rng(seed)
     for part in np.array_split(np.arange(draws), math.ceil(draws * samples / _AT_ONCE)):
-        yield fit.left(chosen.draw(times_s, part.size, random)) + fit.pulled(part.size, random)
+        yield fit.residual(chosen.draw(times_s, part.size, random)) + fit.prior_residual(part.size, random)
 
 
 def sharpened(residuals: Sequence[Residual], fit: LinearFit, noise: NoiseModel) -> LinearFit:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.scores.noise.members import SILENCE, Memory
+from xb_muscle_ros.scores.noise.members import SILENCE, OrnsteinUhlenbeck
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0, MEMBERS, Source, TrialNoise
 from xb_muscle_ros.trials.trial import Trial
 
@@ -48,7 +48,7 @@ def _of_trial(trial: Trial) -> TrialNoise:
             correlation = share * np.exp(-lags / tau_s) + (1.0 - share) * (lags == 0.0)
             # Variance of the residual of noise of variance 1.
             unit = np.einsum("ki,kij,kj->k", weights, correlation, weights)
-            found.append(Memory(size / float(np.sqrt(np.median(unit))), share, tau_s))
+            found.append(OrnsteinUhlenbeck(size / float(np.sqrt(np.median(unit))), share, tau_s))
     found.sort(key=lambda member: member.sd_f0)
     members = tuple(found[k * len(found) // MEMBERS] for k in range(MEMBERS))
     middle = found[len(found) // 2]

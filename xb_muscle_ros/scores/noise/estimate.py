@@ -61,9 +61,9 @@ def _members(own: Sequence[Part], of: Regressions) -> tuple[Regression, ...]:
     return tuple(
         Regression(
             weights=-filters[-1, -2::-1],
-            fresh_f0=float(sd),
+            innovation_sd_f0=float(sd),
             sd_f0=max(float(sd) * math.sqrt(float(sizes[0])), LEAST_SD_F0),
-            colour=correlation(filters),
+            autocorrelation=correlation(filters),
         )
         for filters, sizes, sd in zip(of.filters, of.sizes, fresh, strict=True)
     )

@@ -11,9 +11,9 @@ import numpy.typing as npt
 from scipy.special import ndtri
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.scores.noise import ornstein_uhlenbeck as ou
 from xb_muscle_ros.scores.noise.differences import LEAST_DIFFERENCES, by_differences
 from xb_muscle_ros.scores.noise.estimate import alike, by_regressions
-from xb_muscle_ros.scores.noise.memories import Timed, by_memories
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0, MEMBERS, NoiseModel, Source, TrialNoise
 from xb_muscle_ros.scores.noise.pieces import Piece, curves, evenly_sampled, smooth_pieces
 from xb_muscle_ros.scores.noise.regressions import Part
@@ -110,7 +110,7 @@ def by_windows(windows: Sequence[Window]) -> dict[str, TrialNoise]:
 def by_curves(pieces: Mapping[str, Sequence[Piece]], even: Mapping[str, bool]) -> dict[str, TrialNoise]:
     """Noise of trials that have smooth pieces, from what these leave.
 
-    Autoregressions where samples come evenly and fast enough for hum to be seen, else memories that fade in time.
+    Autoregressions where samples come evenly and fast enough for hum to be seen, else an Ornstein-Uhlenbeck process.
 
     Args:
         pieces: of each trial.
@@ -124,8 +124,8 @@ def by_curves(pieces: Mapping[str, Sequence[Piece]], even: Mapping[str, bool]) -
     }
     width = max((drift.shape[1] for of in fast.values() for _, drift in of), default=0)
     parts = {n: [Part(_step_s(p.time_s), p.force_f0, drift, width) for p, drift in of] for n, of in fast.items()}
-    timed = {n: [Timed(p.time_s, p.force_f0, drift) for p, drift in of] for n, of in drifts.items() if n not in fast}
-    return by_regressions(parts, Source.CURVE) | by_memories(timed, Source.CURVE)
+    timed = {n: [ou.Part(p.time_s, p.force_f0, drift) for p, drift in of] for n, of in drifts.items() if n not in fast}
+    return by_regressions(parts, Source.CURVE) | ou.by_ornstein_uhlenbeck(timed, Source.CURVE)
 
 
 def _step_s(time_s: Array) -> float:
