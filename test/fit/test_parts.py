@@ -24,7 +24,6 @@ from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.measurement.faults import FAULTS
 from xb_muscle_ros.models.fibre_file import Fibre, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.scores.noise.autocovariance import autocovariance
 from xb_muscle_ros.scores.noise.residual import residual_noise
 from xb_muscle_ros.simulation.made import coloured_noise
 from xb_muscle_ros.trials.trial import Trial, TrialFacts
@@ -182,12 +181,6 @@ def test_scale_of_coloured_noise(seed: int, memory: float) -> None:
     assert scale.force_sd_f0 == pytest.approx(2e-3, rel=0.35)
     expected = (1.0 + memory) / (1.0 - memory)
     assert expected / 2.5 < scale.correlation_samples < expected * 2.5
-
-
-def test_autocovariance_of_an_autoregression() -> None:
-    r = coloured_noise(np.random.default_rng(0), 200_000, 1.0, 0.9)
-    np.testing.assert_allclose(autocovariance(r, 30), 0.9 ** np.arange(30), atol=0.05)
-    np.testing.assert_array_equal(autocovariance(np.zeros(50), 10), np.zeros(10))
 
 
 def test_features_of_a_simulation(truth: Fibre) -> None:

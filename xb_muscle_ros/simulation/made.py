@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.signal import lfilter
 
 from xb_muscle_ros.measurement.recording import given_calcium, given_length, recorded_force
 from xb_muscle_ros.models.muscle import Muscle
@@ -25,13 +26,9 @@ def coloured_noise(random: np.random.Generator, n: int, sd: float = NOISE_SD_F0,
         sd: standard deviation, F0.
         memory: correlation of one sample with the next, 0 up to below 1.
     """
-    fresh = random.normal(size=n) * sd * np.sqrt(1.0 - memory**2)
-    fresh[0] = random.normal() * sd
-    out = np.empty(n)
-    last = 0.0
-    for k in range(n):
-        last = memory * last + float(fresh[k])
-        out[k] = last
+    innovations = random.normal(size=n) * sd * np.sqrt(1.0 - memory**2)
+    innovations[0] = random.normal() * sd
+    out: Array = lfilter([1.0], [1.0, -memory], innovations)
     return out
 
 

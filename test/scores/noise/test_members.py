@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import toeplitz
 
-from xb_muscle_ros.scores.noise.members import OrnsteinUhlenbeck, Regression
+from xb_muscle_ros.scores.noise.members import SILENCE, OrnsteinUhlenbeck, Regression
 
 Array = npt.NDArray[np.float64]
 
@@ -48,6 +48,15 @@ def test_variance_of_mean_is_that_of_the_covariance(steps_s: list[float], sd: fl
     time_s, process = np.concatenate([[0.0], np.cumsum(steps_s)]), OrnsteinUhlenbeck(sd, share, tau)
     expected = float(np.sum(covariance(process, time_s))) / time_s.size
     assert process.variance_of_mean(time_s) == pytest.approx(expected, rel=1e-6)
+
+
+def test_autocovariance_of_an_autoregression() -> None:
+    member = Regression(np.array([0.9]), np.sqrt(1.0 - 0.9**2), 1.0, np.array([1.0, 0.9]))
+    np.testing.assert_allclose(member.autocovariance(30), 0.9 ** np.arange(30), rtol=1e-12)
+    np.testing.assert_allclose(SILENCE.autocovariance(10), [1e-10, *[0.0] * 9])
+    r = member.draw(np.arange(200_000) * 1e-3, np.ones(1), np.random.default_rng(0))[0]
+    found = [np.mean(r[: r.size - k] * r[k:]) for k in range(30)]
+    np.testing.assert_allclose(found, member.autocovariance(30), atol=0.05)
 
 
 def test_variance_of_mean_of_a_regression() -> None:

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import lfilter
+from scipy.signal import lfilter, lfiltic
 
-from xb_muscle_ros.scores.noise.autocovariance import extended
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0
 
 Array = npt.NDArray[np.float64]
@@ -49,7 +48,12 @@ class Regression(NamedTuple):
 
     def autocovariance(self, lags: int) -> Array:
         """At lags 0 to `lags` - 1 samples, shape (lags,), F0²."""
-        return extended(self.sd_f0**2 * self.autocorrelation, lags)
+        known = self.sd_f0**2 * self.autocorrelation
+        if lags <= known.size:
+            return known[:lags]
+        recursion = np.concatenate([[1.0], -self.weights])
+        beyond, _ = lfilter([1.0], recursion, np.zeros(lags - known.size), zi=lfiltic([1.0], recursion, known[:0:-1]))
+        return np.concatenate([known, beyond])
 
     def at_lags(self, lags_s: Array, step_s: float) -> Array:
         """See `model.Member`."""
@@ -63,7 +67,7 @@ class Regression(NamedTuple):
         return self._replace(innovation_sd_f0=self.innovation_sd_f0 * factor, sd_f0=self.sd_f0 * factor)
 
 
-SILENCE = Regression(np.empty(0), LEAST_SD_F0, LEAST_SD_F0, np.array([1.0, 0.0]))
+SILENCE = Regression(np.zeros(1), LEAST_SD_F0, LEAST_SD_F0, np.array([1.0, 0.0]))
 
 
 class OrnsteinUhlenbeck(NamedTuple):

@@ -40,15 +40,22 @@ class Piece(NamedTuple):
     Attributes:
         time_s: shape (n,), increasing, s.
         force_f0: shape (n,), F0.
+        drift: what force may do there beside noise, orthonormal, shape (n, columns).
     """
 
     time_s: Array
     force_f0: Array
+    drift: Array
 
 
 def evenly_sampled(trial: Trial) -> bool:
     """Whether a trial's force has samples a step apart, jitter and gaps aside."""
-    steps = np.diff(trial.force_time_s)
+    return steps_evenly(trial.force_time_s)
+
+
+def steps_evenly(time_s: Array) -> bool:
+    """Whether samples are a step apart, jitter and gaps aside."""
+    steps = np.diff(time_s)
     if not steps.size:
         return True
     usual = float(np.median(steps))
@@ -72,13 +79,14 @@ def smooth_pieces(trial: Trial, short: bool = False) -> list[Piece]:
         time_s = trial.force_time_s[inside]
         if time_s.size < (_SHORT if short else LEAST):
             continue
-        columns = curves(time_s).shape[1]
+        drift = curves(time_s)
+        columns = drift.shape[1]
         if time_s.size < (columns + _SPARE if short else _FOR_EACH * (1 + columns)):
             continue
         travel_l0 = _steady_travel_l0(trial, float(time_s[0]), float(time_s[-1]))
         if travel_l0 is not None:
             group = still if abs(travel_l0) <= _tolerance_l0(trial) else moving
-            group.append(Piece(time_s, np.asarray(trial.measured_f0[inside])))
+            group.append(Piece(time_s, np.asarray(trial.measured_f0[inside]), drift))
     return still or moving
 
 

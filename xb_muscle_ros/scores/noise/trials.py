@@ -15,7 +15,7 @@ from xb_muscle_ros.scores.noise import ornstein_uhlenbeck as ou
 from xb_muscle_ros.scores.noise.differences import LEAST_DIFFERENCES, by_differences
 from xb_muscle_ros.scores.noise.estimate import alike, by_regressions
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0, MEMBERS, NoiseModel, Source, TrialNoise
-from xb_muscle_ros.scores.noise.pieces import Piece, curves, evenly_sampled, smooth_pieces
+from xb_muscle_ros.scores.noise.pieces import Piece, evenly_sampled, smooth_pieces
 from xb_muscle_ros.scores.noise.regressions import Part
 from xb_muscle_ros.scores.noise.windows import LEAST, Window, isometric_window
 from xb_muscle_ros.scores.steady import steady_part
@@ -116,15 +116,14 @@ def by_curves(pieces: Mapping[str, Sequence[Piece]], even: Mapping[str, bool]) -
         pieces: of each trial.
         even: whether its force is sampled evenly.
     """
-    drifts = {name: [(p, curves(p.time_s)) for p in of] for name, of in pieces.items() if of}
     fast = {
-        n: of
-        for n, of in drifts.items()
-        if even[n] and _step_s(of[0][0].time_s) <= _HUM_S and all(p.time_s.size >= LEAST for p, _ in of)
+        n
+        for n, of in pieces.items()
+        if of and even[n] and _step_s(of[0].time_s) <= _HUM_S and all(p.time_s.size >= LEAST for p in of)
     }
-    width = max((drift.shape[1] for of in fast.values() for _, drift in of), default=0)
-    parts = {n: [Part(_step_s(p.time_s), p.force_f0, drift, width) for p, drift in of] for n, of in fast.items()}
-    timed = {n: [ou.Part(p.time_s, p.force_f0, drift) for p, drift in of] for n, of in drifts.items() if n not in fast}
+    width = max((p.drift.shape[1] for n in fast for p in pieces[n]), default=0)
+    parts = {n: [Part(_step_s(p.time_s), p.force_f0, p.drift, width) for p in pieces[n]] for n in pieces if n in fast}
+    timed = {n: [ou.Part(*p) for p in of] for n, of in pieces.items() if of and n not in fast}
     return by_regressions(parts, Source.CURVE) | ou.by_ornstein_uhlenbeck(timed, Source.CURVE)
 
 
