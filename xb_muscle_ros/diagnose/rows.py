@@ -24,7 +24,8 @@ Array = npt.NDArray[np.float64]
 _MOST_PLACES = 12
 
 
-def _rmsd(values: Array) -> float:
+def rmsd(values: Array) -> float:
+    """Root mean square of differences."""
     return float(np.sqrt(np.mean(values**2)))
 
 
@@ -76,7 +77,7 @@ def scores(study: Searched, names: Names, i: int | None = None) -> Scores:
     """How far a set is from the recordings, of all fibres or of one."""
     chosen = range(len(study.fibres)) if i is None else [i]
     squares = np.concatenate([study.around(names, k).residual_f0 for k in chosen])
-    return Scores(tuple(n.value for n in names), _rmsd(squares), study.judged.heldout.rmsd(names, i))
+    return Scores(tuple(n.value for n in names), rmsd(squares), study.judged.heldout.rmsd(names, i))
 
 
 def benchmark(study: Searched, before: Sequence[Around]) -> float | None:
@@ -105,8 +106,8 @@ def of_trials(study: Searched, chosen: Names, traces: Sequence[Traced]) -> tuple
                 noise_sd_f0=noise.sd_f0,
                 noise_from=noise.source.value,
                 noise_samples=noise.samples,
-                before_rmsd_f0=_rmsd(t.before_f0 - t.measured_f0),
-                after_rmsd_f0=_rmsd(t.after_f0 - t.measured_f0),
+                before_rmsd_f0=rmsd(t.forces.before_f0 - t.forces.measured_f0),
+                after_rmsd_f0=rmsd(t.forces.after_f0 - t.forces.measured_f0),
                 heldout_before_f0=held[0] if held[0] is not None and np.isfinite(held[0]) else None,
                 heldout_after_f0=held[1] if held[1] is not None and np.isfinite(held[1]) else None,
             )
@@ -143,7 +144,7 @@ def of_fibres(study: Searched, chosen: Names, found: Sequence[Component]) -> tup
             if c.kind is Kind.MECHANISM and c.by_fibre[i].inclusion_probability >= NAMED
         ]
         closure = study.recorded[i].closure_f0
-        size = _rmsd(np.concatenate(list(closure.values()))) if closure else 0.0
+        size = rmsd(np.concatenate(list(closure.values()))) if closure else 0.0
         rows.append(
             OfStudyFibre(
                 fibre=fibre.name,

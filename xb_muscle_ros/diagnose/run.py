@@ -16,7 +16,7 @@ from xb_muscle_ros.diagnose.intake import FibreStudy, read_fibres
 from xb_muscle_ros.diagnose.outputs import Files, write
 from xb_muscle_ros.diagnose.recording import recorded
 from xb_muscle_ros.diagnose.result import Diagnosis
-from xb_muscle_ros.diagnose.searching import searched
+from xb_muscle_ros.diagnose.searching import fit_base, search
 from xb_muscle_ros.trials.completing import Known
 from xb_muscle_ros.work import Options
 
@@ -97,7 +97,8 @@ def diagnose(
     """
     begun = time.monotonic()
     told = told_of(error_sds)
-    study = searched(studies, effort, seed, options, {} if data is None else data.features, error_sds)
+    features = {} if data is None else data.features
+    study = search(fit_base(studies, effort, seed, options, features, error_sds), effort.folds)
     found, made = recorded(study, effort, seed)
     found = replace(found, notes=(*found.notes, *told))
     for given, fitted in ((data, True), (table, False)):

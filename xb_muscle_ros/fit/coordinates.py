@@ -22,9 +22,9 @@ FITTED_BY_THE_PAPER = (
     "f", "k11", "k21", "k22", "dLcrit", "kon", "koop", "kappa", "n", "JF", "vmax", "kse", "kse0", "kpe", "Fpe0",
 )  # fmt: skip
 """Over all its models (van der Zee et al. 2026, "Fitted model parameters"): those that its AIC counts."""
-# And what other fibres need: a sigmoid's activation at full calcium, which the paper held at its usual value; the shape
-# of a soft parallel spring: where it stays as it starts, a fit makes a measurement artefact of what the spring gets
-# wrong.
+# And what the paper does not name: a sigmoid's activation at full calcium, of which every released set has its own; the
+# shape of a soft parallel spring: where it stays as it starts, a fit makes a measurement artefact of what the spring
+# gets wrong.
 FITTED = (*FITTED_BY_THE_PAPER, "act_max", "lpe0", "pe_sharpness")
 # How far a fit may go from its start where nothing else is said: a factor either way.
 REACH = 100.0

@@ -75,11 +75,8 @@ def predicted(system: System, fit: Fit, trial: FitTrial, closure_f0: Array | Non
         UserError: the model has no solution.
     """
     problem = system.problem(fit.names, fit.values)
-    size = len(problem.coordinates)
-    correction = None
-    if closure_f0 is not None:
-        correction = Correction.level(np.zeros(size), {trial.name: closure_f0}, np.zeros(len(problem.features)))
-    problem = replace(problem, correction=correction)
+    own = None if closure_f0 is None else Correction.level({trial.name: closure_f0}, np.zeros(len(problem.features)))
+    problem = replace(problem, correction=own)
     return calibrated_force(problem, problem.start, trial).force_f0
 
 
