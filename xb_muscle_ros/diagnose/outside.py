@@ -1,4 +1,4 @@
-"""What an answer predicts outside the study: forces that no muscle bears are told before anyone relies on it."""
+"""What an answer predicts outside the study: forces that no muscle bears are reported before anyone relies on it."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ def worse_left_out(rows: Sequence[OfTrial]) -> list[str]:
         before, after = row.heldout_before_f0, row.heldout_after_f0
         # Where the base predicts a trial it was left out: what has no number then has no solution.
         if before is not None and (after is None or after > before + _WORSE_F0):
-            told = "no solution" if after is None else f"{percent(after)} for {percent(before)} % F0"
-            found.setdefault(row.fibre, []).append(f"{row.trial} ({told})")
+            change = "no solution" if after is None else f"{percent(after)} for {percent(before)} % F0"
+            found.setdefault(row.fibre, []).append(f"{row.trial} ({change})")
     return [
-        f"fibre {fibre}: the answer predicts {'trial' if len(told) == 1 else 'trials'} {joined(told)} worse than the "
-        "base does where they are left out of the fit; do not rely on it in movements like that"
-        for fibre, told in found.items()
+        f"fibre {fibre}: the answer predicts trial{'s' * (len(trials) > 1)} {joined(trials)} worse than the base "
+        "does where they are left out of the fit; do not rely on it in movements like that"
+        for fibre, trials in found.items()
     ]
 
 

@@ -49,7 +49,7 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
     count = len(study.fibres)
     before = [study.around((), i) for i in range(count)]
     after = [study.around(chosen, i) if chosen else before[i] for i in range(count)]
-    left = [study.recordings[i].significance(after[i]) if chosen else study.base[i] for i in range(count)]
+    remains = [study.recordings[i].significance(after[i]) if chosen else study.base[i] for i in range(count)]
     traces = traced(study, chosen, before, after)
     found = tuple(directed(study, c, traces) for c in components(judged))
     detected = any(s.detected(ALPHA) for s in study.base)
@@ -70,7 +70,7 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
     remaining = Remaining(
         rmsd_f0=rmsd(np.concatenate([a.residual_f0 for a in after])),
         noise_f0=float(np.median(judged.noise_f0)),
-        where=places(names, left),
+        where=places(names, remains),
         law=last_law,
     )
     warned = [w for s in study.studies for t in s.trials for w in t.warnings]
@@ -110,7 +110,7 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
         trials=trials,
         nuisances=nuisances(study, chosen),
         map_before={n: study.base[known[n]].map(ALPHA) for n in names},
-        map_after={n: left[known[n]].map(ALPHA) for n in names},
+        map_after={n: remains[known[n]].map(ALPHA) for n in names},
         next_experiment=_next(proposal),
         augmented={f.name: name for name, f in augmented.items()},
         warnings=tuple(dict.fromkeys(warned)),
@@ -136,10 +136,10 @@ def _without_errors(study: Searched, chosen: Names, i: int) -> str:
         forces = problem.predicted(z)
     except UserError:
         return f"{name}: the augmented file has no solution without the measurement errors of the fit"
-    left = [f - t.measured_f0 for f, t in zip(forces, recorded.trials, strict=True)]
+    residuals = [f - t.measured_f0 for f, t in zip(forces, recorded.trials, strict=True)]
     with_errors = rmsd(study.around(chosen, i).residual_f0)
     return (
-        f"{name}: a replay of the augmented file leaves {percent(rmsd(np.concatenate(left)))} % F0, because files "
+        f"{name}: a replay of the augmented file leaves {percent(rmsd(np.concatenate(residuals)))} % F0, because files "
         "have no measurement errors (pCa shifts, gain of length, offsets); with those of the fit it is "
         f"{percent(with_errors)} % F0"
     )
@@ -149,8 +149,8 @@ def _described(study: Searched, before: Sequence[Around], after: Sequence[Around
     """Whether there is anything to build on: the model describes the recordings, and noise does not hide all."""
     for i, recorded in enumerate(study.recorded):
         spread = float(np.std(recorded.measured))
-        left = min(rmsd(before[i].residual_f0), rmsd(after[i].residual_f0))
-        if study.judged.noise_f0[i] > _NOISY_F0 or left > _UNDESCRIBED * spread:
+        smallest = min(rmsd(before[i].residual_f0), rmsd(after[i].residual_f0))
+        if study.judged.noise_f0[i] > _NOISY_F0 or smallest > _UNDESCRIBED * spread:
             return False
     return True
 
@@ -232,7 +232,7 @@ def _notes(study: Searched, chosen: Names, effort: Effort) -> list[str]:
     several = len(study.fibres) > 1
     for i, each in enumerate(study.studies):
         own = [
-            *each.told,
+            *each.notes,
             *notes.of_order([t.facts.trial for t in each.trials]),
             *notes.of_folds(study.recorded[i].trials, study.judged.heldout.folds[i]),
             *notes.of_fibre(

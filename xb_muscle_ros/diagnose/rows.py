@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.component import NAMED, Component, Kind
 from xb_muscle_ros.diagnose.inference.left_out import left_out
-from xb_muscle_ros.diagnose.noise.kernel import Law as FoundLaw
+from xb_muscle_ros.diagnose.noise.law import Law as FoundLaw
 from xb_muscle_ros.diagnose.noise.residuals import Around
 from xb_muscle_ros.diagnose.noise.significance import ALPHA, Significance
 from xb_muscle_ros.diagnose.result import Law, Nuisance, OfStudyFibre, OfTrial, Place, Scores
@@ -37,16 +37,7 @@ def places(names: Sequence[str], found: Sequence[Significance]) -> tuple[Place, 
     rows = []
     for name, s in zip(names, found, strict=True):
         pcas = {r.trial: r.pca for r in s.residuals}
-        own = s.mismatch(ALPHA)
-        if not own and s.detected(ALPHA):
-            k = int(np.argmax(s.rms_f0))
-            cell = s.cells[k]
-            own = [
-                {
-                    "trial": cell.trial, "phase": cell.phase, "start_s": cell.start_s, "end_s": cell.end_s,
-                    "size_f0": float(s.rms_f0[k]), "mean_f0": float(s.mean_f0[k]), "p_value": float(s.p_value[k]),
-                }
-            ]  # fmt: skip
+        own = s.mismatch(ALPHA) or ([s.largest()] if s.detected(ALPHA) else [])
         rows += [
             Place(
                 fibre=name, trial=row["trial"], phase=row["phase"], start_s=row["start_s"], end_s=row["end_s"],

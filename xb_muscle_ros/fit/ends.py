@@ -132,7 +132,7 @@ def quadratic_ends(
 
 
 def _cut(correlation: float, sign: float, z: float, bounds: tuple[float, float], sd: float, wanted: float) -> bool:
-    """Whether another coordinate's bound would cut an interval short: it goes along as far as its bound, then stops."""
+    """Whether another coordinate's bound would cut an interval short: it follows as far as its bound, then stops."""
     along = sign * correlation
     room = (bounds[1] - z if along > 0.0 else z - bounds[0]) / sd
     strength = abs(along)

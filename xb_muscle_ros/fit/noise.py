@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.fit.training import Training
-from xb_muscle_ros.scores.noise.model import LEAST_SD_F0
-from xb_muscle_ros.scores.noise.residual import ResidualNoise, residual_noise
+from xb_muscle_ros.scores.noise.residual import LEAST_SD_F0, ResidualNoise, residual_noise
 
 Array = npt.NDArray[np.float64]
 

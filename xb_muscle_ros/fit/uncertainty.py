@@ -63,7 +63,7 @@ def curvature(objective: Objective, z: Array) -> Curvature:
     return Curvature(covariance, np.where(weak, 1.0, inflation), weak, share)
 
 
-class Side(NamedTuple):
+class ProfileEnd(NamedTuple):
     """One end of an interval.
 
     Attributes:
@@ -81,7 +81,7 @@ class Side(NamedTuple):
 
 def profile_side(
     objective: Objective, best: Solution, index: int, up: bool, shape: Curvature, level: float = 0.95
-) -> Side:
+) -> ProfileEnd:
     """Follow one coordinate from the best point, all others moving along, to where the likelihood ratio ends it.
 
     Args:
@@ -102,9 +102,9 @@ def profile_side(
     inflation = float(shape.inflation[index])
     reaches: dict[float, Solution] = {}
 
-    def ended(target: float) -> Side:
+    def ended(target: float) -> ProfileEnd:
         what = profile_end(objective, best, reaches[target], index, inflation, wanted)
-        return Side(target, what, points, None)
+        return ProfileEnd(target, what, points, None)
 
     distance = wanted * sd if 0.0 < sd < 1e3 else 0.5
     reached = origin
@@ -117,7 +117,7 @@ def profile_side(
         found = descend(objective, guess, held=index, most=30, tolerance=1e-4)
         gain = 2.0 * (found.cost - best.cost) / inflation
         if gain < -0.02:
-            return Side(target, UNSETTLED, points, found.z.tolist())
+            return ProfileEnd(target, UNSETTLED, points, found.z.tolist())
         root = float(np.sqrt(max(gain, 0.0)))
         points.append((target, root))
         reaches[target] = found
@@ -125,13 +125,13 @@ def profile_side(
         if abs(root - wanted) < _CLOSE:
             return ended(target)
         if at_bound and root < wanted:
-            return Side(bound, BOUND, points, None)
+            return ProfileEnd(bound, BOUND, points, None)
         distance = _next_distance(points, origin, wanted)
     inside = [p for p in points if p[1] >= wanted]
     # The search did not settle: the nearest point that is out, if there is one.
     if inside:
         return ended(min(inside, key=lambda p: abs(p[0] - origin))[0])
-    return Side(reached, UNSETTLED, points, None)
+    return ProfileEnd(reached, UNSETTLED, points, None)
 
 
 def _next_distance(points: list[tuple[float, float]], origin: float, wanted: float) -> float:

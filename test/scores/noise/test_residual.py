@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from xb_muscle_ros.scores.noise.ornstein_uhlenbeck import SHARES, TAUS_S, Whitened
-from xb_muscle_ros.scores.noise.residual import ResidualNoise, residual_noise
+from xb_muscle_ros.scores.noise.residual import LEAST_SD_F0, ResidualNoise, residual_noise
 from xb_muscle_ros.simulation.made import coloured_noise
 
 Array = npt.NDArray[np.float64]
@@ -78,5 +78,5 @@ def test_whitening_and_sums_are_those_of_the_dense_covariance(point: int) -> Non
 def test_no_coordinates_and_no_trials() -> None:
     time_s = 1e-3 * np.arange(200.0)
     alone = residual_noise([time_s], [np.zeros(200)], [np.zeros((200, 0))], np.zeros((0, 0)))
-    assert np.sqrt(alone.variance_f0) == pytest.approx([1e-5])
+    assert np.sqrt(alone.variance_f0) == pytest.approx([LEAST_SD_F0])
     assert residual_noise([], [], [], np.eye(2)).variance_f0.shape == (0,)

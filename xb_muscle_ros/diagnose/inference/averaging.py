@@ -77,8 +77,8 @@ class Averaged:
         if not np.any(here) or not np.any(without):
             return 0.0
         best = [int(np.argmax(np.where(chosen, self.log_evidence, -np.inf))) for chosen in (here, without)]
-        left = [float(self.mean_square_f0[k]) for k in best]
-        return math.sqrt(max(left[1] - left[0], 0.0))
+        squares = [float(self.mean_square_f0[k]) for k in best]
+        return math.sqrt(max(squares[1] - squares[0], 0.0))
 
     def rivals(self, name: Name, others: Sequence[Name]) -> list[Name]:
         """Names that take its place in other sets."""

@@ -193,11 +193,16 @@ class Descent:
             else:
                 return point, updated
 
+    def free(self, point: Point, gradient: Array) -> npt.NDArray[np.bool_]:
+        """Coordinates that no bound stops, shape (coordinates,)."""
+        stopped = ((point.z <= self.lower) & (gradient > 0.0)) | ((point.z >= self.upper) & (gradient < 0.0))
+        out: npt.NDArray[np.bool_] = ~stopped
+        return out
+
     def _step(self, point: Point, jacobian: Array, cost: float, damping: float) -> tuple[Point, float, float] | None:
         """The next point, its cost and the damping to go on with; None where nothing is lower."""
         curvature, gradient = self.normal(point, jacobian)
-        stuck = ((point.z <= self.lower) & (gradient > 0.0)) | ((point.z >= self.upper) & (gradient < 0.0))
-        free = ~stuck
+        free = self.free(point, gradient)
         if not np.any(free):
             return None
         within = np.ix_(free, free)

@@ -29,7 +29,7 @@ _WORTH = 0.5
 _PATIENCE = 3.0
 # Form errors of mechanisms: share of what a mechanism does that its form here gets wrong.
 FORM = 0.12
-# Of a set whose curvature cannot be told.
+# Of a set whose curvature is not known.
 _NONE = -1e9
 
 
@@ -222,9 +222,9 @@ class Explorer:
         """Fit the most promising candidates beside a set."""
         promises = self.promises(names)
         gains = {n: float(sum(p.gain for p in ps)) for n, ps in promises.items()}
-        told = sorted((n for n in gains if not np.isnan(gains[n])), key=lambda n: -gains[n])
+        ranked = sorted((n for n in gains if not np.isnan(gains[n])), key=lambda n: -gains[n])
         # An odd name more costs its odds; what promises less than that is not fitted.
-        chosen = [n for n in told if gains[n] > 1.0][:count]
+        chosen = [n for n in ranked if gains[n] > 1.0][:count]
         chosen += [n for n in gains if np.isnan(gains[n]) and blind]
         wanted = [((*names, n), self.starts(promises[n])) for n in chosen]
         return self.fit(wanted, f"{label(names)} and one more")

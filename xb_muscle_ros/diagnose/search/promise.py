@@ -52,9 +52,7 @@ class Linear:
         self.slopes = self.descent.slopes(self.point)
         self.force = self.point.residual + self.descent.training.measured
         _, gradient = self.descent.normal(self.point, self.slopes)
-        lower, upper = self.descent.lower, self.descent.upper
-        z = self.point.z
-        self.free = ~(((z <= lower) & (gradient > 0.0)) | ((z >= upper) & (gradient < 0.0)))
+        self.free = self.descent.free(self.point, gradient)
 
     def solve(
         self, columns: Array, information: Array, gradient: Array, own: Array | None = None

@@ -63,19 +63,19 @@ class Whitened:
         state, variance = np.zeros((taus_s.size, columns.shape[1])), np.zeros(taus_s.size)
         for begin in range(0, self.samples, _BLOCK):
             block = columns[begin : begin + _BLOCK]
-            innovations = np.empty((taus_s.size, *block.shape))
-            for k, row in enumerate(block):
-                kept = decay[begin + k]
-                state = kept[:, None] * state
+            innovations = np.empty((block.shape[0], *state.shape))
+            variances = np.empty((block.shape[0], taus_s.size))
+            for k, kept in enumerate(decay[begin : begin + _BLOCK]):
+                state *= kept[:, None]
                 variance = kept**2 * variance + (1.0 - kept**2) * shares
-                of_innovation = variance + 1.0 - shares
-                innovation = row - state
-                gain = variance / of_innovation
-                state = state + gain[:, None] * innovation
-                variance = variance * (1.0 - gain)
-                innovations[:, k] = innovation / np.sqrt(of_innovation)[:, None]
-                self.log += np.log(of_innovation)
-            self.products += np.swapaxes(innovations, -1, -2) @ innovations
+                variances[k] = variance + 1.0 - shares
+                gain = variance / variances[k]
+                np.subtract(block[k], state, out=innovations[k])
+                state += gain[:, None] * innovations[k]
+                variance *= 1.0 - gain
+            self.log += np.sum(np.log(variances), axis=0)
+            innovations /= np.sqrt(variances)[:, :, None]
+            self.products += innovations.transpose(1, 2, 0) @ innovations.transpose(1, 0, 2)
 
 
 class Part:

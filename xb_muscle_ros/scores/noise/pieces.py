@@ -119,13 +119,13 @@ def _steady_travel_l0(trial: Trial, start_s: float, end_s: float) -> float | Non
 def curves(time_s: Array) -> Array:
     """What force may do in a piece: an orthonormal cubic and exponentials since its begin, shape (n, columns).
 
-    The fastest exponential fades within a usual step of the first ones.
+    The fastest exponential decays within a usual step of the first ones.
     """
     since_s = time_s - time_s[0]
     span_s, step_s = float(since_s[-1]), float(np.median(np.diff(time_s[:LEAST])))
     count = max(int(np.log(span_s / step_s) / np.log(_APART)), 0)
-    fading = np.exp(-since_s[:, None] / (span_s / _APART ** np.arange(1, count + 1)))
-    columns = np.concatenate([np.vander(2.0 * since_s / span_s - 1.0, _DEGREE + 1), fading], axis=1)
+    decaying = np.exp(-since_s[:, None] / (span_s / _APART ** np.arange(1, count + 1)))
+    columns = np.concatenate([np.vander(2.0 * since_s / span_s - 1.0, _DEGREE + 1), decaying], axis=1)
     directions, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
     out: Array = directions[:, sizes > 1e-8 * sizes[0]]
     return out

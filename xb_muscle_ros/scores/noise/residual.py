@@ -17,21 +17,25 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.scores.noise.members import recursion
-from xb_muscle_ros.scores.noise.model import LEAST_SD_F0
 from xb_muscle_ros.scores.noise.ornstein_uhlenbeck import SHARES, TAUS_S, Whitened, log_prior
 
 Array = npt.NDArray[np.float64]
 
-# Rounds in which scales and what the fit took of each trial settle.
-_ROUNDS = 12
+# No recording is better known, nor is a model, F0: a third of the least noise of a measured fibre. It keeps intervals
+# from being absurdly narrow where trials are simulated ones without noise.
+LEAST_SD_F0 = 1e-4
+# Rounds in which scales and what the fit took of each trial settle, on the grid and on the finer one.
+_ROUNDS, _FINE_ROUNDS = 3, 4
 # Points of the grid with less of the probability than this are left out.
 _IMPROBABLE = 1e-6
+# A process that decays within more than this share of a trial is not told apart from a drift there.
+_SLOWEST = 0.25
 # A trial has this share of its samples left beside the fit at least.
 _LEAST_LEFT = 0.1
 # What neither data nor priors tell stays where it is: so little is added to the curvature, as a share of the largest.
 _UNSEEN = 1e-9
 # The finer grid: points along each axis, to so many standard deviations, and this far in logarithms at least.
-_FINE, _WIDTH_SDS, _LEAST_WIDTH = 9, 2.5, 1.2
+_FINE, _WIDTH_SDS, _LEAST_WIDTH = 7, 2.5, 1.0
 
 
 class ResidualNoise(NamedTuple):
@@ -104,7 +108,7 @@ class _Trials(NamedTuple):
     information: Array
     pull: Array
 
-    def noise(self, taus_s: Array, shares: Array) -> ResidualNoise:
+    def noise(self, taus_s: Array, shares: Array, rounds: int) -> ResidualNoise:
         """The noise with these time constants and shares of the process."""
         count = self.pull.size
         # Of most artefacts of the measurement each trial has its own.
@@ -114,7 +118,7 @@ class _Trials(NamedTuple):
         mean_squares = np.array([max(float(np.mean(r**2)), LEAST_SD_F0**2) for r in self.residuals_f0])
         variances = np.repeat(mean_squares.reshape(-1, 1), taus_s.size, axis=1)
         log = log_prior(taus_s)
-        for _ in range(_ROUNDS):
+        for _ in range(rounds):
             curvature = np.tile(self.information, (taus_s.size, 1, 1))
             score = np.tile(-self.pull, (taus_s.size, 1))
             for o, part, variance in zip(own, parts, variances, strict=True):
@@ -128,10 +132,10 @@ class _Trials(NamedTuple):
                 of_values, across, gram = part.products[:, 0, 0], part.products[:, 0, 1:], part.products[:, 1:, 1:]
                 log = log - 0.5 * (part.samples * np.log(variances[i]) + part.log + of_values / variances[i])
                 step = move[:, o]
-                left = of_values - np.sum(step * (2.0 * across - np.einsum("kij,kj->ki", gram, step)), axis=1)
+                residual = of_values - np.sum(step * (2.0 * across - np.einsum("kij,kj->ki", gram, step)), axis=1)
                 taken = np.sum(inverse[:, o[:, None], o] * gram, axis=(1, 2)) / variances[i]
                 freedom = np.maximum(part.samples - taken, _LEAST_LEFT * part.samples)
-                variances[i] = np.maximum(left / freedom, LEAST_SD_F0**2)
+                variances[i] = np.maximum(residual / freedom, LEAST_SD_F0**2)
         probability = np.exp(log - log.max())
         probability = np.where(probability > _IMPROBABLE * probability.sum(), probability, 0.0)
         return ResidualNoise(self.times_s, taus_s, shares, probability / probability.sum(), variances)
@@ -162,5 +166,8 @@ def residual_noise(
         information * scale * scale[:, None],
         np.zeros(scale.size) if pull is None else pull * scale,
     )
-    coarse = trials.noise(TAUS_S, SHARES)
-    return trials.noise(*coarse.around())
+    slowest_s = _SLOWEST * max((float(t[-1] - t[0]) for t in times_s), default=float(TAUS_S[0]))
+    offered = TAUS_S <= max(slowest_s, float(TAUS_S.min()))
+    coarse = trials.noise(TAUS_S[offered], SHARES[offered], _ROUNDS)
+    taus_s, shares = coarse.around()
+    return trials.noise(np.minimum(taus_s, max(slowest_s, float(TAUS_S.min()))), shares, _FINE_ROUNDS)

@@ -175,7 +175,7 @@ def _power_of_force(log_sd: Array, log_level: Array) -> tuple[float, float, floa
     apart, off = log_level - np.mean(log_level), log_sd - np.mean(log_sd)
     spread = max(float(np.std(log_sd, ddof=1)), 1e-3) if log_sd.size > 1 else _SPREAD
     # Data and prior, each by its information.
-    told, prior = float(apart @ apart) / spread**2, _POWER_SD**-2
-    power = (float(apart @ off) / spread**2 + prior * _POWER) / (told + prior)
+    information, prior = float(apart @ apart) / spread**2, _POWER_SD**-2
+    power = (float(apart @ off) / spread**2 + prior * _POWER) / (information + prior)
     around = float(np.sqrt(np.sum((off - power * apart) ** 2) / (log_sd.size - 1))) if log_sd.size > 1 else _SPREAD
-    return power, (told + prior) ** -0.5, around
+    return power, (information + prior) ** -0.5, around
