@@ -14,8 +14,7 @@ import pytest
 
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.noise.cells import Residual
-from xb_muscle_ros.diagnose.search.descent import Fit
-from xb_muscle_ros.diagnose.search.explore import fitted
+from xb_muscle_ros.diagnose.search.descent import Fit, fitted
 from xb_muscle_ros.diagnose.search.system import System
 from xb_muscle_ros.diagnose.search.whole import whole
 from xb_muscle_ros.fit.linear_fit import LinearFit

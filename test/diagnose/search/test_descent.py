@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.diagnose.names import Name
-from xb_muscle_ros.diagnose.search.descent import Descent, Fit
-from xb_muscle_ros.diagnose.search.explore import fitted
+from xb_muscle_ros.diagnose.search.descent import Descent, Fit, fitted
 from xb_muscle_ros.diagnose.search.system import INDEPENDENT, System
 from xb_muscle_ros.errors import UserError
 

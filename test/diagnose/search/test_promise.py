@@ -10,8 +10,7 @@ import pytest
 from made_trials import fitted_trials, given_fibre, trials_of, truth
 
 from xb_muscle_ros.diagnose.names import Name
-from xb_muscle_ros.diagnose.search.descent import Descent, Fit, Point
-from xb_muscle_ros.diagnose.search.explore import fitted
+from xb_muscle_ros.diagnose.search.descent import Descent, Fit, Point, fitted
 from xb_muscle_ros.diagnose.search.promise import BLIND, Linear, promise
 from xb_muscle_ros.diagnose.search.system import System
 

@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.component import HeldOutGain
 from xb_muscle_ros.diagnose.names import Name
-from xb_muscle_ros.diagnose.search.descent import Fit
-from xb_muscle_ros.diagnose.search.explore import Explorer, fitted
+from xb_muscle_ros.diagnose.search.descent import Fit, fitted
+from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import SATURATING, Names, System
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.calibration import calibrated_force

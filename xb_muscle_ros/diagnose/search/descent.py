@@ -8,7 +8,7 @@ the residuals have there, which can only lower that cost (the logarithm lies bel
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -245,3 +245,35 @@ class Descent:
             by_label,
             round(self.simulated),
         )
+
+
+def fit_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Fit a set from the best of several starts; None where the model has no solution at any."""
+    system = System.from_json(task["system"])
+    found = fitted(system, [Name(n) for n in task["names"]], task["starts"], task["most"], task["tolerance"])
+    return None if found is None else found.to_json()
+
+
+def fitted(
+    system: System, names: Collection[Name], starts: Sequence[Mapping[str, float]], most: int, tolerance: float
+) -> Fit | None:
+    """Fit a set from the best of several starts; None where the model has no solution at any."""
+    begun: list[tuple[float, Descent, Array, Array | None]] = []
+    for start in starts:
+        try:
+            problem = system.problem(names, start)
+            descent = Descent(system, problem)
+            if len(starts) == 1:
+                begun.append((0.0, descent, problem.start, None))
+                continue
+            point, near = descent.walk(problem.start, 2, tolerance)
+            begun.append((descent.cost(point), descent, point.z, near))
+        except (UserError, np.linalg.LinAlgError):
+            continue
+    for _, descent, z, _near in sorted(begun, key=lambda b: b[0]):
+        try:
+            point, slopes = descent.walk(z, most, tolerance)
+            return descent.fit(ordered(names), point, slopes)
+        except (UserError, np.linalg.LinAlgError):
+            continue
+    return None

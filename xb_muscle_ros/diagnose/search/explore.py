@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.inference.population import Estimate, adjustment
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
-from xb_muscle_ros.diagnose.search.descent import Descent, Fit
+from xb_muscle_ros.diagnose.search.descent import Fit, fit_task
 from xb_muscle_ros.diagnose.search.promise import Linear, Promise, promise
 from xb_muscle_ros.diagnose.search.system import Names, System, label, ordered, without
 from xb_muscle_ros.diagnose.search.whole import beside
@@ -53,38 +52,6 @@ class Effort:
 
 
 QUICK = Effort(steps=5, candidates=4, rivals=2, most=5, tolerance=0.1)
-
-
-def fit_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Fit a set from the best of several starts; None where the model has no solution at any."""
-    system = System.from_json(task["system"])
-    found = fitted(system, [Name(n) for n in task["names"]], task["starts"], task["most"], task["tolerance"])
-    return None if found is None else found.to_json()
-
-
-def fitted(
-    system: System, names: Collection[Name], starts: Sequence[Mapping[str, float]], most: int, tolerance: float
-) -> Fit | None:
-    """Fit a set from the best of several starts; None where the model has no solution at any."""
-    begun: list[tuple[float, Descent, Array, Array | None]] = []
-    for start in starts:
-        try:
-            problem = system.problem(names, start)
-            descent = Descent(system, problem)
-            if len(starts) == 1:
-                begun.append((0.0, descent, problem.start, None))
-                continue
-            point, near = descent.walk(problem.start, 2, tolerance)
-            begun.append((descent.cost(point), descent, point.z, near))
-        except (UserError, np.linalg.LinAlgError):
-            continue
-    for _, descent, z, _near in sorted(begun, key=lambda b: b[0]):
-        try:
-            point, slopes = descent.walk(z, most, tolerance)
-            return descent.fit(ordered(names), point, slopes)
-        except (UserError, np.linalg.LinAlgError):
-            continue
-    return None
 
 
 def spread(system: System) -> list[dict[str, float]]:

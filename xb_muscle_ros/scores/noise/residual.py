@@ -166,8 +166,7 @@ def residual_noise(
         information * scale * scale[:, None],
         np.zeros(scale.size) if pull is None else pull * scale,
     )
-    slowest_s = _SLOWEST * max((float(t[-1] - t[0]) for t in times_s), default=float(TAUS_S[0]))
-    offered = TAUS_S <= max(slowest_s, float(TAUS_S.min()))
-    coarse = trials.noise(TAUS_S[offered], SHARES[offered], _ROUNDS)
-    taus_s, shares = coarse.around()
-    return trials.noise(np.minimum(taus_s, max(slowest_s, float(TAUS_S.min()))), shares, _FINE_ROUNDS)
+    slowest_s = max([float(TAUS_S.min()), *(_SLOWEST * float(t[-1] - t[0]) for t in times_s)])
+    offered = np.flatnonzero(slowest_s >= TAUS_S)
+    taus_s, shares = trials.noise(TAUS_S[offered], SHARES[offered], _ROUNDS).around()
+    return trials.noise(np.minimum(taus_s, slowest_s), shares, _FINE_ROUNDS)
