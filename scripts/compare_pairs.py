@@ -22,7 +22,7 @@ from xb_muscle_ros.diagnose.intake import read_fibres
 from xb_muscle_ros.diagnose.names import MEASUREMENT
 from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import Names, ordered
-from xb_muscle_ros.diagnose.searching import begun
+from xb_muscle_ros.diagnose.searching import fit_base
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import write_text
 
@@ -72,7 +72,9 @@ def main(given: argparse.Namespace) -> None:
     """Fit all sets and write the table."""
     studies = read_fibres(given.bags, given.fiber, given.model, None, None, None)
     effort = QUICK if given.quick else Effort()
-    study = begun(studies, effort, 1, work_options_of(given, journal=given.journal), {}, error_sds_of(given.nuisance))
+    study = fit_base(
+        studies, effort, 1, work_options_of(given, journal=given.journal), {}, error_sds_of(given.nuisance)
+    )
     explorer = study.explorer
     alone = singles(explorer)
     both = pairs(explorer, alone)

@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.noise.cells import Residual
-from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.diagnose.noise.significance import significance
+from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.scores.noise.model import NoiseModel
 from xb_muscle_ros.scores.noise.pieces import evenly_sampled, smooth_pieces
 from xb_muscle_ros.scores.noise.trials import by_curves
@@ -126,7 +126,7 @@ def _fitted(trials: Sequence[Trial], noise: Sequence[Array]) -> tuple[list[Resid
     columns = [np.column_stack([np.ones(t.time_s.size), t.time_s / t.time_s[-1], t.length_change_l0]) for t in trials]
     slopes = np.concatenate(columns)
     fit = LinearFit(slopes, np.full(slopes.shape[0], 90.0), np.ones(3))
-    left = np.split(fit.left(np.concatenate(noise)[:, None])[:, 0], np.cumsum([e.size for e in noise])[:-1])
+    left = np.split(fit.residual(np.concatenate(noise)[:, None])[:, 0], np.cumsum([e.size for e in noise])[:-1])
     found = [
         Residual(t.facts.trial, 6.0, t.time_s, e, t.facts.phases, t.length_change_l0, np.ones(e.size))
         for t, e in zip(trials, left, strict=True)

@@ -14,11 +14,10 @@ import pytest
 
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.noise.cells import Residual
-from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
-from xb_muscle_ros.diagnose.search.descent import Fit
-from xb_muscle_ros.diagnose.search.explore import fitted
+from xb_muscle_ros.diagnose.search.descent import Fit, fitted
 from xb_muscle_ros.diagnose.search.system import System
 from xb_muscle_ros.diagnose.search.whole import whole
+from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
 from xb_muscle_ros.scores.noise.model import NoiseModel
 from xb_muscle_ros.scores.noise.trials import by_windows
@@ -65,7 +64,7 @@ class Study(NamedTuple):
 
     def after(self, change: Array) -> tuple[Residual, ...]:
         """Residuals that the fit leaves of a change of the data."""
-        left = self.split(self.fit.left(change[:, None])[:, 0])
+        left = self.split(self.fit.residual(change[:, None])[:, 0])
         return tuple(r._replace(value_f0=value) for r, value in zip(self.residuals, left, strict=True))
 
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from xb_muscle_ros.diagnose.error_sds import error_sds_of, told_of
+from xb_muscle_ros.diagnose.error_sds import error_sd_lines, error_sds_of
 from xb_muscle_ros.errors import UserError
 
 
 def test_what_is_given_is_taken_and_told() -> None:
     found = error_sds_of(["time_shift=0.002", "pca_shift=0.1"])
     assert found == {"time_shift": 0.002, "pca_shift": 0.1}
-    assert told_of(found) == [
+    assert error_sd_lines(found) == [
         "ordinary measurement error 'time_shift' has SD 0.002 s, as was asked (usually 0.0007 s)",
         "ordinary measurement error 'pca_shift' has SD 0.1, as was asked (usually 0.05)",
     ]
-    assert told_of({}) == []
+    assert error_sd_lines({}) == []
 
 
 @pytest.mark.parametrize(
@@ -45,6 +45,6 @@ def test_arguments_that_cannot_be_read(given: list[str], words: str) -> None:
 )
 def test_sds_that_are_refused(name: str, sd: float, words: str) -> None:
     with pytest.raises(UserError) as caught:
-        told_of({name: sd})
+        error_sd_lines({name: sd})
     assert words in str(caught.value)
     assert str(caught.value).startswith("--nuisance")

@@ -58,13 +58,13 @@ def test_every_measured_cell_of_the_studys_fibres_is_a_feature(tmp_path: Path) -
     assert {(f.kind, f.pca, f.recovery_s, f.amplitude_l0, f.value) for f in found.features[B]} == {
         (f.kind, f.pca, f.recovery_s, f.amplitude_l0, f.value) for f in cells
     }
-    assert found.told == ()
+    assert found.notes == ()
 
 
 def test_what_is_missing_or_met_in_no_trial_is_told(tmp_path: Path) -> None:
     path = table(tmp_path / "t.json", [A])
     found = read_features(path, {A: trials_at(6.2), B: trials_at(6.2)})
-    assert found.told == (
+    assert found.notes == (
         f"features {path} have nothing of fibre {B}",
         f"features {path} in solutions of no trial, taken without a pCa shift: {A} at pCa 4.5",
     )
@@ -176,6 +176,6 @@ def test_what_was_measured_predicts_itself(real: FeatureTable) -> None:
 
 def test_a_run_down_fibres_stretches_are_no_data(shared_data: Path) -> None:
     found = read_features(shared_data / "empirical_srs.json", {"13Dec2017a": trials_at(4.5, 6.3)})
-    assert found.told_of_fit[0].startswith("13Dec2017a: features ")
-    assert "21 test stretches at pCa 4.5 are left out" in found.told_of_fit[0]
+    assert found.notes_of_fit[0].startswith("13Dec2017a: features ")
+    assert "21 test stretches at pCa 4.5 are left out" in found.notes_of_fit[0]
     assert len(found.cells["13Dec2017a"]) == len(found.features["13Dec2017a"]) + 21

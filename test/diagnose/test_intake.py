@@ -58,9 +58,9 @@ def test_one_fibre_takes_all_bags_whatever_they_name(make: Make) -> None:
     assert study.fibre.name == B
     assert [trial.facts.fibre for trial in study.trials] == ["somebody", A]
     # A is a fibre of the package, B the one whose file was given.
-    assert study.told == (f"trials of fibres somebody, {A} are diagnosed as those of {B}, the one file given",)
+    assert study.notes == (f"trials of fibres somebody, {A} are diagnosed as those of {B}, the one file given",)
     (own,) = read_fibres([make(B, 6.1)], [B])
-    assert own.told == ()
+    assert own.notes == ()
 
 
 def test_trials_go_to_the_fibre_they_name_in_the_order_of_recording(make: Make) -> None:
@@ -76,12 +76,12 @@ def test_trials_go_to_the_fibre_they_name_in_the_order_of_recording(make: Make) 
 def test_coarse_samples_are_told_by_fibre(make: Make) -> None:
     bags = [make(A, 6.1, rate_hz=166.6), make(B, 6.1, folder="fine")]
     coarse, fine = read_fibres(bags, [A, B])
-    assert coarse.told == (
+    assert coarse.notes == (
         "corners of length between samples were recovered (1 trial)",
         "SRS cannot be measured in 1 of 1 stretched trials (in amp383_rt100ms_pca61: 2 samples in the first 10 ms of "
         "the stretch; 3 are needed)",
     )
-    assert fine.told == ()
+    assert fine.notes == ()
 
 
 def _refused(bags: list[Path], fibers: list[str], **more: object) -> str:
@@ -192,9 +192,9 @@ def test_coarse_recordings_without_phases_are_read_and_said(shared_data: Path, r
             write_trial(tmp_path / "bare" / event.bag.name, bare)
     (whole,) = read_fibres([tmp_path / "whole"], [A])
     (bare,) = read_fibres([tmp_path / "bare"], [A])
-    assert "phases found from length (10 trials)" in bare.told
-    assert "corners of length between samples were recovered (10 trials)" in bare.told
-    assert any(line.startswith("SRS cannot be measured in 10 of 10 stretched trials") for line in bare.told)
+    assert "phases found from length (10 trials)" in bare.notes
+    assert "corners of length between samples were recovered (10 trials)" in bare.notes
+    assert any(line.startswith("SRS cannot be measured in 10 of 10 stretched trials") for line in bare.notes)
     for one, other in zip(whole.trials, bare.trials, strict=True):
         assert [p.name for p in one.facts.phases] == [p.name for p in other.facts.phases]
         starts = [[p.start_s for p in trial.facts.phases] for trial in (one, other)]

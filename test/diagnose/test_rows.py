@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.diagnose.noise.cells import Residual, cut, mean, rms
-from xb_muscle_ros.diagnose.noise.kernel import Law
+from xb_muscle_ros.diagnose.noise.law import Law
 from xb_muscle_ros.diagnose.noise.significance import Significance
 from xb_muscle_ros.diagnose.rows import law_row, places
 from xb_muscle_ros.trials.trial import Phase

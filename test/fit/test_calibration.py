@@ -90,7 +90,7 @@ def test_a_correction_is_added(truth: Fibre, made_trials: Maker) -> None:
     (trial,) = fit_trials(made_trials((4.5,), 1), [True])
     plain = problem_with(truth, (trial,), "force_offset")
     added = np.full(trial.time_s.size, 0.02)
-    corrected = replace(plain, correction=Correction.level(plain.start, {trial.name: added}, np.empty(0)))
+    corrected = replace(plain, correction=Correction.level({trial.name: added}, np.empty(0)))
     first, second = (calibrated_force(problem, problem.start, trial) for problem in (plain, corrected))
     assert second.own["force_offset"] == pytest.approx(first.own["force_offset"] - 0.01, abs=1e-3)
     assert np.mean(second.force_f0 - first.force_f0) == pytest.approx(0.01, abs=1e-3)

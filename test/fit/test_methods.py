@@ -110,7 +110,7 @@ def test_correction_survives_the_way_to_a_worker(grid_problem: Problem) -> None:
 def test_level_correction_is_right_at_its_point_alone(grid_problem: Problem) -> None:
     z = grid_problem.start
     here = difference(grid_problem, z)
-    level = Correction.level(z, here.force, here.features)
+    level = Correction.level(here.force, here.features)
     training, exact = Training(replace(fast_form(grid_problem), correction=level)), Training(grid_problem)
     np.testing.assert_allclose(training.force(z), exact.force(z), atol=1e-12)
     assert np.abs(training.force(z + 0.3) - exact.force(z + 0.3)).max() > 1e-4

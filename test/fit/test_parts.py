@@ -16,7 +16,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.coordinates import Choice, fault_coordinates, parameter_coordinates, population_choices
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.features import F0_ANCHOR, Feature, measured, simulated
-from xb_muscle_ros.fit.noise import FIRST, noise_autocovariances, scale_of
+from xb_muscle_ros.fit.noise import FIRST, scale_of
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.solve import Objective, descend
 from xb_muscle_ros.fit.split import held_out
@@ -24,7 +24,7 @@ from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 from xb_muscle_ros.models.fibre_file import Fibre, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.scores.noise.autocovariance import autocovariance
+from xb_muscle_ros.scores.noise.residual import residual_noise
 from xb_muscle_ros.simulation.made import coloured_noise
 from xb_muscle_ros.trials.trial import Trial, TrialFacts
 
@@ -178,16 +178,11 @@ def test_descent_with_one_coordinate_held(problem: Problem) -> None:
 def test_scale_of_coloured_noise(seed: int, memory: float) -> None:
     random = np.random.default_rng(seed)
     residuals = [coloured_noise(random, 2000, 2e-3, memory) for _ in range(5)]
-    scale = scale_of(residuals, 3)
+    times, levels = [1e-3 * np.arange(2000.0)] * 5, [np.ones((2000, 1))] * 5
+    scale = scale_of(residual_noise(times, residuals, levels, np.zeros((1, 1))))
     assert scale.force_sd_f0 == pytest.approx(2e-3, rel=0.35)
     expected = (1.0 + memory) / (1.0 - memory)
     assert expected / 2.5 < scale.correlation_samples < expected * 2.5
-
-
-def test_autocovariance_of_an_autoregression() -> None:
-    r = coloured_noise(np.random.default_rng(0), 200_000, 1.0, 0.9)
-    np.testing.assert_allclose(autocovariance(r, 30), 0.9 ** np.arange(30), atol=0.05)
-    np.testing.assert_array_equal(autocovariance(np.zeros(50), 10), np.zeros(10))
 
 
 def test_features_of_a_simulation(truth: Fibre) -> None:
@@ -233,30 +228,3 @@ def test_stretches_of_a_fibre_that_has_run_down_are_left_out(tmp_path: Path) -> 
     with pytest.raises(UserError, match="'b' is not among a"):
         measured(path, "b")
     assert all(f.kind == "isometric_force" for f in measured(path, "a", stiffness=False))
-
-
-def test_noise_is_found_behind_what_a_fit_took_of_it() -> None:
-    """Slow regressors take the slow part of coloured noise away; corrected, its size and memory come back."""
-    random = np.random.default_rng(3)
-    n, trials = 420, 6
-    slow = np.stack([np.cos(np.pi * k * np.arange(n) / n) for k in range(3)], axis=1)
-    slow /= np.linalg.norm(slow, axis=0)
-    plain, corrected = [], []
-    for _ in range(8):
-        noise = [coloured_noise(random, n) for _ in range(trials)]
-        basis = np.kron(np.eye(trials), slow)
-
-        def left(e: np.ndarray, basis: np.ndarray = basis) -> np.ndarray:
-            return e - basis @ np.linalg.lstsq(basis, e, rcond=None)[0]
-
-        residual = left(np.concatenate(noise)[:, None])[:, 0].reshape(trials, n)
-        # Variance of a slow sum, which is what makes a slow parameter uncertain.
-        share = 1.0 - np.arange(n) / n
-        for target, gammas in (
-            (plain, [autocovariance(r, n) for r in residual]),
-            (corrected, noise_autocovariances(list(residual), left)),
-        ):
-            target.append(np.mean([2.0 * float(share @ g) - g[0] for g in gammas]))
-    true = 1e-6 * (2.0 * float(share @ 0.95 ** np.arange(n)) - 1.0)
-    assert np.mean(plain) < 0.7 * true
-    assert np.mean(corrected) == pytest.approx(true, rel=0.3)

@@ -81,7 +81,7 @@ def run(arguments: argparse.Namespace) -> int:
             state = muscle.settle(0.0, calcium, arguments.settle)
             # Variable steps from corner to corner: the protocol itself, not its samples.
             states = muscle.follow(state, corner_s, corner_l0, 0.0 * corner_s + calcium, trial.time_s)
-        simulated = as_simulated(muscle, trial, trial.time_s, states)
+        simulated = as_simulated(trial, trial.time_s, muscle.outputs_of(states))
         source = f"simulated: fibre {fibre.name}, model {fibre.model}, method {fibre.method}"
         trial = replace(trial, facts=replace(trial.facts, source=source))
         if arguments.as_measured:

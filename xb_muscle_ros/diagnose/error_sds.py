@@ -29,11 +29,11 @@ def error_sds_of(given: Sequence[str]) -> dict[str, float]:
                 f"--nuisance {text}: SD '{value}' is no number; give FAULT=SD without a unit, such as time_shift=0.002 "
                 "(s)"
             ) from None
-    told_of(found)
+    error_sd_lines(found)
     return found
 
 
-def told_of(error_sds: Mapping[str, float]) -> list[str]:
+def error_sd_lines(error_sds: Mapping[str, float]) -> list[str]:
     """A line for each.
 
     Raises:

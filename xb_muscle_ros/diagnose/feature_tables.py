@@ -33,16 +33,16 @@ class FeatureTable:
         features: of each fibre that the file has, in the order of the study; what a fit takes as data. Test stretches
             of a solution in which the fibre had run down are left out.
         cells: of each of these fibres, every cell that was measured, those of run-down fibres as well.
-        told: lines on fibres without features, and on solutions that no trace was recorded in.
-        told_of_fit: lines on what a fit leaves out.
+        notes: lines on fibres without features, and on solutions that no trace was recorded in.
+        notes_of_fit: lines on what a fit leaves out.
     """
 
     path: Path
     data: SrsTable
     features: Mapping[str, tuple[Feature, ...]]
     cells: Mapping[str, tuple[Feature, ...]]
-    told: tuple[str, ...]
-    told_of_fit: tuple[str, ...] = ()
+    notes: tuple[str, ...]
+    notes_of_fit: tuple[str, ...] = ()
 
 
 def read_features(path: str | Path, trials: Mapping[str, Sequence[Trial]]) -> FeatureTable:
@@ -64,20 +64,20 @@ def read_features(path: str | Path, trials: Mapping[str, Sequence[Trial]]) -> Fe
         raise UserError(
             f"features {path} are of {of}; the trials are of {ours}; give the table of a fibre of the study"
         )
-    told: list[str] = []
+    notes: list[str] = []
     missing = [name for name in trials if name not in names]
     if missing:
-        told.append(f"features {path} have nothing of fibre{'s'[: len(missing) - 1]} {', '.join(missing)}")
-    features, told_of_fit = {}, []
+        notes.append(f"features {path} have nothing of fibre{'s'[: len(missing) - 1]} {', '.join(missing)}")
+    features, notes_of_fit = {}, []
     for name in names:
         lines: list[str] = []
         features[name] = measured(path, name, tell=lines.append)
-        told_of_fit += [f"{name}: {line}" for line in lines]
+        notes_of_fit += [f"{name}: {line}" for line in lines]
         _check_force(path, name, data)
     cells = {name: measured_cells(data, name) for name in names}
-    _check_solutions(path, features, trials, told)
+    _check_solutions(path, features, trials, notes)
     return FeatureTable(
-        path, data, MappingProxyType(features), MappingProxyType(cells), tuple(told), tuple(told_of_fit)
+        path, data, MappingProxyType(features), MappingProxyType(cells), tuple(notes), tuple(notes_of_fit)
     )
 
 
@@ -92,7 +92,7 @@ def _check_force(path: Path, fibre: str, data: SrsTable) -> None:
 
 
 def _check_solutions(
-    path: Path, features: Mapping[str, tuple[Feature, ...]], trials: Mapping[str, Sequence[Trial]], told: list[str]
+    path: Path, features: Mapping[str, tuple[Feature, ...]], trials: Mapping[str, Sequence[Trial]], notes: list[str]
 ) -> None:
     """Features and traces meet in the fibre's solutions: pCa shifts are known of these alone."""
     lines, unmet, any_shared = [], [], False
@@ -109,7 +109,7 @@ def _check_solutions(
             "pCa of the trials"
         )
     if unmet:
-        told.append(f"features {path} in solutions of no trial, taken without a pCa shift: {'; '.join(unmet)}")
+        notes.append(f"features {path} in solutions of no trial, taken without a pCa shift: {'; '.join(unmet)}")
 
 
 def _listed(pcas: Sequence[float]) -> str:

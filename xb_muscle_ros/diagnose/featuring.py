@@ -38,7 +38,7 @@ def with_features(d: Diagnosis, study: Searched, table: FeatureTable, fitted: bo
     """
     rows: list[Feature] = []
     values: dict[str, dict[str, Array]] = {"before": {}, "after": {}}
-    lines = list(table.told_of_fit if fitted else ()) + list(table.told)
+    lines = list(table.notes_of_fit if fitted else ()) + list(table.notes)
     for i, fibre in enumerate(study.fibres):
         cells = table.cells.get(fibre.name)
         if cells is None:

@@ -26,12 +26,12 @@ class FibreStudy:
     Attributes:
         fibre: where its base model starts.
         trials: all with measured force, complete and checked, in the order of recording.
-        told: lines on what the bags did not tell, and on what cannot be read off their forces.
+        notes: lines on what the bags did not say, and on what cannot be read off their forces.
     """
 
     fibre: Fibre
     trials: tuple[Trial, ...]
-    told: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def read_fibres(
@@ -124,7 +124,7 @@ def _by_name(bags: Sequence[str | Path], fibres: Sequence[Fibre], known: Known) 
     for fibre in fibres:
         mine = [(p, bag, of[fibre.name]) for (p, bag), of in zip(opened, of_bags, strict=True) if fibre.name in of]
         read = [trial_of_bag(bag, channel, known.of_file(fibre), str(path)) for path, bag, channel in mine]
-        notes = counted(told for _, told in read)
+        notes = counted(lines for _, lines in read)
         found.append(FibreStudy(fibre, tuple(trial for trial, _ in read), tuple(notes)))
     return found
 
@@ -163,7 +163,7 @@ def _checked(study: FibreStudy) -> FibreStudy:
                 f"trial {trial.facts.trial}: measured force is 0 N in all {trial.force_n.size} samples; check the "
                 "force channel, or leave the bag out"
             )
-    return FibreStudy(study.fibre, study.trials, (*study.told, *_stiffness_lines(study.trials)))
+    return FibreStudy(study.fibre, study.trials, (*study.notes, *_stiffness_lines(study.trials)))
 
 
 def _stiffness_lines(trials: Sequence[Trial]) -> list[str]:

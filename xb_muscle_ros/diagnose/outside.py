@@ -1,4 +1,4 @@
-"""What an answer predicts outside the study: forces that no muscle bears are told before anyone relies on it."""
+"""What an answer predicts outside the study: forces that no muscle bears are reported before anyone relies on it."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.simulation.offline import outputs
 
 Array = npt.NDArray[np.float64]
 
@@ -54,21 +55,19 @@ def worse_left_out(rows: Sequence[OfTrial]) -> list[str]:
         before, after = row.heldout_before_f0, row.heldout_after_f0
         # Where the base predicts a trial it was left out: what has no number then has no solution.
         if before is not None and (after is None or after > before + _WORSE_F0):
-            told = "no solution" if after is None else f"{percent(after)} for {percent(before)} % F0"
-            found.setdefault(row.fibre, []).append(f"{row.trial} ({told})")
+            change = "no solution" if after is None else f"{percent(after)} for {percent(before)} % F0"
+            found.setdefault(row.fibre, []).append(f"{row.trial} ({change})")
     return [
-        f"fibre {fibre}: the answer predicts {'trial' if len(told) == 1 else 'trials'} {joined(told)} worse than the "
-        "base does where they are left out of the fit; do not rely on it in movements like that"
-        for fibre, told in found.items()
+        f"fibre {fibre}: the answer predicts trial{'s' * (len(trials) > 1)} {joined(trials)} worse than the base "
+        "does where they are left out of the fit; do not rely on it in movements like that"
+        for fibre, trials in found.items()
     ]
 
 
 def _force(fibre: Fibre, trial: FitTrial, length: Array, calcium: Array, slower: float) -> Array | None:
     """Force with times stretched by a factor, F0; None where the model has no solution."""
     try:
-        muscle = Muscle(fibre)
-        state = muscle.settle(float(length[0]), float(calcium[0]))
-        return muscle.outputs_of(muscle.run(state, trial.dt_s * slower, length, calcium))["force_f0"]
+        return outputs(Muscle(fibre), trial.dt_s * slower, length, calcium)["force_f0"]
     except UserError:
         return None
 

@@ -22,7 +22,16 @@ from xb_muscle_ros.diagnose.outputs import NEXT, Files, augmented_name
 from xb_muscle_ros.diagnose.planning import plan
 from xb_muscle_ros.diagnose.residual import AnswerResidual, ResidualLaw, ResidualMap
 from xb_muscle_ros.diagnose.result import FORMAT, Diagnosis, NextExperiment, SetOfMechanisms, Verdict
-from xb_muscle_ros.diagnose.rows import benchmark, law_row, nuisance_parameters, of_fibres, of_trials, places, scores
+from xb_muscle_ros.diagnose.rows import (
+    benchmark,
+    law_row,
+    nuisance_parameters,
+    of_fibres,
+    of_trials,
+    places,
+    rmsd,
+    scores,
+)
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.search.whole import beside, only
 from xb_muscle_ros.diagnose.searching import Searched
@@ -55,8 +64,8 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
     detected = any(s.detected(ALPHA) for s in study.base)
     described = _described(study, before, after)
     fine = all(
-        _rmsd(t.start_f0 - t.measured_f0) <= max(_AS_GOOD * _rmsd(t.before_f0 - t.measured_f0), FLOOR_F0)
-        for t in traces
+        rmsd(t.start_f0 - t.measured_f0) <= max(_AS_GOOD * rmsd(t.before_f0 - t.measured_f0), FLOOR_F0)
+        for t in (each.forces for each in traces)
     )
     verdict = verdict_of(found, described, detected, fine)
     answer = answer_of(found) if described else ()
@@ -89,7 +98,7 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
         p_value=min(1.0, count * min(s.overall_p for s in study.base)),
         described=described,
         residual=AnswerResidual(
-            rmsd_f0=_rmsd(np.concatenate([a.residual_f0 for a in after])),
+            rmsd_f0=rmsd(np.concatenate([a.residual_f0 for a in after])),
             noise_f0=float(np.median(judged.noise_f0)),
             places=places(names, of_answer),
             law=answer_law,
@@ -120,7 +129,7 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
     if proposal is not None:
         fibre = study.fibres[0]
         protocol = scaled(proposal.protocol.trial, fibre.reference_length_m, fibre.f0_n)
-    return d, Files(augmented, tuple(t.plain for t in traces), protocol)
+    return d, Files(augmented, tuple(t.forces for t in traces), protocol)
 
 
 def _by_component(found: Sequence[Component]) -> tuple[Component, ...]:
@@ -146,23 +155,19 @@ def _without_errors(study: Searched, chosen: Names, i: int) -> str:
     except UserError:
         return f"{name}: the augmented file has no solution without the measurement artefacts of the fit"
     residual = [f - t.measured_f0 for f, t in zip(forces, recorded.trials, strict=True)]
-    with_errors = _rmsd(study.around(chosen, i).residual_f0)
+    with_errors = rmsd(study.around(chosen, i).residual_f0)
     return (
-        f"{name}: a replay of the augmented file leaves {percent(_rmsd(np.concatenate(residual)))} % F0, because files "
+        f"{name}: a replay of the augmented file leaves {percent(rmsd(np.concatenate(residual)))} % F0, because files "
         "have no measurement artefacts (pCa shifts, gain of length, offsets); with those of the fit it is "
         f"{percent(with_errors)} % F0"
     )
-
-
-def _rmsd(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _described(study: Searched, before: Sequence[Around], after: Sequence[Around]) -> bool:
     """Whether there is anything to build on: the model describes the recordings, and noise does not hide all."""
     for i, recorded in enumerate(study.recorded):
         spread = float(np.std(recorded.measured))
-        residual = min(_rmsd(before[i].residual_f0), _rmsd(after[i].residual_f0))
+        residual = min(rmsd(before[i].residual_f0), rmsd(after[i].residual_f0))
         if study.judged.noise_f0[i] > _NOISY_F0 or residual > _UNDESCRIBED * spread:
             return False
     return True
@@ -221,7 +226,7 @@ def _missing(study: Searched, verdict: Verdict, found: Sequence[Component], afte
         name, noise = study.fibres[i].name, study.judged.noise_f0[i]
         if noise > _NOISY_F0:
             lines.append(f"force with less noise: {100 * noise:.1f} % F0 in fibre {name} hides what is looked for")
-        if _rmsd(after[i].residual_f0) > _UNDESCRIBED * float(np.std(recorded.measured)):
+        if rmsd(after[i].residual_f0) > _UNDESCRIBED * float(np.std(recorded.measured)):
             lines.append(
                 "recordings that the model describes at all: after the fit the residual of fibre "
                 f"{name} is half of its force's variation; check that channels, units, calcium and fibre fit"
@@ -238,7 +243,7 @@ def _notes(study: Searched, chosen: Names, effort: Effort) -> list[str]:
     several = len(study.fibres) > 1
     for i, each in enumerate(study.studies):
         own = [
-            *each.told,
+            *each.notes,
             *notes.of_order([t.facts.trial for t in each.trials]),
             *notes.of_folds(study.recorded[i].trials, study.judged.heldout.folds[i]),
             *notes.of_fibre(

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.component import NAMED, Component, Kind
 from xb_muscle_ros.diagnose.inference.left_out import left_out
-from xb_muscle_ros.diagnose.noise.kernel import Law
+from xb_muscle_ros.diagnose.noise.law import Law
 from xb_muscle_ros.diagnose.noise.residuals import Around
 from xb_muscle_ros.diagnose.noise.significance import ALPHA, Significance
 from xb_muscle_ros.diagnose.residual import Place, ResidualLaw
@@ -25,7 +25,8 @@ Array = npt.NDArray[np.float64]
 _MOST_PLACES = 12
 
 
-def _rmsd(values: Array) -> float:
+def rmsd(values: Array) -> float:
+    """Root mean square of differences."""
     return float(np.sqrt(np.mean(values**2)))
 
 
@@ -37,16 +38,7 @@ def places(names: Sequence[str], found: Sequence[Significance]) -> tuple[Place, 
     rows = []
     for name, s in zip(names, found, strict=True):
         pcas = {r.trial: r.pca for r in s.residuals}
-        own = s.mismatch(ALPHA)
-        if not own and s.detected(ALPHA):
-            k = int(np.argmax(s.rms_f0))
-            cell = s.cells[k]
-            own = [
-                {
-                    "trial": cell.trial, "phase": cell.phase, "start_s": cell.start_s, "end_s": cell.end_s,
-                    "size_f0": float(s.rms_f0[k]), "mean_f0": float(s.mean_f0[k]), "p_value": float(s.p_value[k]),
-                }
-            ]  # fmt: skip
+        own = s.mismatch(ALPHA) or ([s.largest()] if s.detected(ALPHA) else [])
         rows += [
             Place(
                 fibre=name, trial=row["trial"], phase=row["phase"], start_s=row["start_s"], end_s=row["end_s"],
@@ -77,7 +69,7 @@ def scores(study: Searched, names: Names, i: int | None = None) -> Scores:
     """How far a set is from the recordings, of all fibres or of one."""
     chosen = range(len(study.fibres)) if i is None else [i]
     squares = np.concatenate([study.around(names, k).residual_f0 for k in chosen])
-    return Scores(tuple(n.value for n in names), _rmsd(squares), study.judged.heldout.rmsd(names, i))
+    return Scores(tuple(n.value for n in names), rmsd(squares), study.judged.heldout.rmsd(names, i))
 
 
 def benchmark(study: Searched, before: Sequence[Around]) -> float | None:
@@ -106,8 +98,8 @@ def of_trials(study: Searched, chosen: Names, traces: Sequence[Traced]) -> tuple
                 noise_sd_f0=noise.sd_f0,
                 noise_source=noise.source.value,
                 noise_samples=noise.samples,
-                before_rmsd_f0=_rmsd(t.before_f0 - t.measured_f0),
-                after_rmsd_f0=_rmsd(t.after_f0 - t.measured_f0),
+                before_rmsd_f0=rmsd(t.forces.before_f0 - t.forces.measured_f0),
+                after_rmsd_f0=rmsd(t.forces.after_f0 - t.forces.measured_f0),
                 heldout_before_f0=held[0] if held[0] is not None and np.isfinite(held[0]) else None,
                 heldout_after_f0=held[1] if held[1] is not None and np.isfinite(held[1]) else None,
             )
@@ -144,7 +136,7 @@ def of_fibres(study: Searched, chosen: Names, found: Sequence[Component]) -> tup
             if c.kind is Kind.MECHANISM and c.by_fibre[i].inclusion_probability >= NAMED
         ]
         closure = study.recorded[i].closure_f0
-        size = _rmsd(np.concatenate(list(closure.values()))) if closure else 0.0
+        size = rmsd(np.concatenate(list(closure.values()))) if closure else 0.0
         rows.append(
             OfStudyFibre(
                 fibre=fibre.name,

@@ -9,14 +9,14 @@ from pathlib import Path
 from types import MappingProxyType
 
 from xb_muscle_ros.diagnose.effort import QUICK, Effort
-from xb_muscle_ros.diagnose.error_sds import told_of
+from xb_muscle_ros.diagnose.error_sds import error_sd_lines
 from xb_muscle_ros.diagnose.feature_tables import FeatureTable, read_features
 from xb_muscle_ros.diagnose.featuring import with_features
 from xb_muscle_ros.diagnose.intake import FibreStudy, given_twice, read_fibres
 from xb_muscle_ros.diagnose.outputs import Files, write
 from xb_muscle_ros.diagnose.recording import recorded
 from xb_muscle_ros.diagnose.result import Diagnosis
-from xb_muscle_ros.diagnose.searching import searched
+from xb_muscle_ros.diagnose.searching import fit_base, search
 from xb_muscle_ros.trials.completing import Known
 from xb_muscle_ros.work import Options
 
@@ -97,10 +97,11 @@ def diagnose(
         UserError: see `diagnose_bags`.
     """
     begun = time.monotonic()
-    told = told_of(error_sds)
-    study = searched(studies, effort, seed, options, {} if data is None else data.features, error_sds)
+    lines = error_sd_lines(error_sds)
+    features = {} if data is None else data.features
+    study = search(fit_base(studies, effort, seed, options, features, error_sds), effort.folds)
     found, made = recorded(study, effort, seed)
-    found = replace(found, notes=(*found.notes, *told))
+    found = replace(found, notes=(*found.notes, *lines))
     for given, fitted in ((data, True), (table, False)):
         if given is not None:
             found = with_features(found, study, given, fitted)

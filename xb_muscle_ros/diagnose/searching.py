@@ -16,7 +16,6 @@ from xb_muscle_ros.diagnose.noise.closure import closure_error
 from xb_muscle_ros.diagnose.noise.residuals import Around, Recordings
 from xb_muscle_ros.diagnose.noise.significance import ALPHA, FLOOR_F0, Significance
 from xb_muscle_ros.diagnose.search.compiling import compile_first
-from xb_muscle_ros.diagnose.search.descent import TOLD
 from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import Names, System
 from xb_muscle_ros.errors import UserError
@@ -29,8 +28,8 @@ from xb_muscle_ros.work import Options
 
 
 @dataclass(frozen=True)
-class Searched:
-    """A study, searched.
+class BaseFitted:
+    """A study before its search: the base is fitted, and the Gaussian form's own error taken out.
 
     Attributes:
         studies: as read.
@@ -38,8 +37,6 @@ class Searched:
         recorded: all samples of each fibre.
         recordings: trials of each fibre with their noise.
         explorer: all fits.
-        judged: averages and held-out predictions.
-        base: significance of what the base left in each fibre.
         lines: warnings on the way.
     """
 
@@ -48,13 +45,16 @@ class Searched:
     recorded: tuple[System, ...]
     recordings: tuple[Recordings, ...]
     explorer: Explorer
-    judged: Judged
-    base: tuple[Significance, ...]
     lines: tuple[str, ...]
 
     def around(self, names: Names, i: int) -> Around:
         """A set's fit in one fibre, at all samples."""
-        return around(self.explorer, self.recorded[i], names, i)
+        explorer = self.explorer
+        return Around.of(self.recorded[i], explorer.fits[names][i], explorer.systems[i].effective_samples)
+
+    def significance(self) -> tuple[Significance, ...]:
+        """Of the base's residual in each fibre."""
+        return tuple(r.significance(self.around((), i)) for i, r in enumerate(self.recordings))
 
     def fibre_with(self, names: Names, i: int) -> Fibre:
         """A fitted fibre in the whole model."""
@@ -62,40 +62,27 @@ class Searched:
         return problem.fibre_at(problem.start)
 
 
-def around(explorer: Explorer, recorded: System, names: Names, i: int) -> Around:
-    """A set's fit in one fibre, at all samples."""
-    return Around.of(recorded, explorer.fits[names][i], TOLD * float(np.sum(explorer.systems[i].weights)))
-
-
 @dataclass(frozen=True)
-class Begun:
-    """A study before its search: the base is fitted, and the Gaussian form's own error taken out.
+class Searched(BaseFitted):
+    """A study, searched.
 
     Attributes:
-        fibres, recorded, recordings, lines: see `Searched`.
-        explorer: with the base's fit.
+        judged: averages and held-out predictions.
+        base: significance of the base's residual in each fibre.
     """
 
-    fibres: tuple[Fibre, ...]
-    recorded: tuple[System, ...]
-    recordings: tuple[Recordings, ...]
-    explorer: Explorer
-    lines: tuple[str, ...]
-
-    def significance(self) -> tuple[Significance, ...]:
-        """Of what the base leaves in each fibre."""
-        pairs = enumerate(zip(self.recordings, self.recorded, strict=True))
-        return tuple(r.significance(around(self.explorer, s, (), i)) for i, (r, s) in pairs)
+    judged: Judged
+    base: tuple[Significance, ...]
 
 
-def begun(
+def fit_base(
     studies: Sequence[FibreStudy],
     effort: Effort,
     seed: int,
     options: Options,
     features: Mapping[str, tuple[Feature, ...]] = MappingProxyType({}),
     error_sds: Mapping[str, float] = MappingProxyType({}),
-) -> Begun:
+) -> BaseFitted:
     """Fit the base of a study.
 
     Args:
@@ -132,39 +119,32 @@ def begun(
         options = replace(options, processes=0)
     explorer = Explorer(systems, effort.search, options)
     explorer.base()
-    made = Begun(tuple(fibres), tuple(recorded), tuple(recordings), explorer, tuple(lines))
+    made = BaseFitted(tuple(studies), tuple(fibres), tuple(recorded), tuple(recordings), explorer, tuple(lines))
     if any(found.detected(ALPHA) for found in made.significance()):
         made = replace(made, recorded=tuple(_closed(explorer, recorded)))
     return made
 
 
-def searched(
-    studies: Sequence[FibreStudy],
-    effort: Effort,
-    seed: int,
-    options: Options,
-    features: Mapping[str, tuple[Feature, ...]] = MappingProxyType({}),
-    error_sds: Mapping[str, float] = MappingProxyType({}),
-) -> Searched:
-    """Search a study; arguments as `begun` has them.
+def search(study: BaseFitted, folds: int) -> Searched:
+    """Search a study.
+
+    Args:
+        study: its base is fitted.
+        folds: groups of trials left out in turn, at most.
 
     Raises:
-        UserError: no solution at the start, or a force that cannot be looked at.
+        UserError: no solution with all that has evidence, or a force that cannot be looked at.
     """
-    study = begun(studies, effort, seed, options, features, error_sds)
     explorer = study.explorer
     explorer.explore()
     if any(s.closure_f0 for s in explorer.systems) and _does_without(explorer):
         study = replace(study, recorded=tuple(replace(s, closure_f0={}) for s in study.recorded))
         explorer.anew([replace(s, closure_f0={}) for s in explorer.systems])
         explorer.explore()
-    heldout = HeldOut(explorer, study.recorded, effort.folds, explorer.options)
+    heldout = HeldOut(explorer, study.recorded, folds, explorer.options)
     judged = Judged.of(explorer, heldout, [r.usual_noise_f0() for r in study.recordings])
     _predict(judged)
-    return Searched(
-        tuple(studies), study.fibres, study.recorded, study.recordings, explorer, judged, study.significance(),
-        study.lines,
-    )  # fmt: skip
+    return Searched(**study.__dict__, judged=judged, base=study.significance())
 
 
 def _closed(explorer: Explorer, recorded: Sequence[System]) -> list[System]:
@@ -188,7 +168,7 @@ def _does_without(explorer: Explorer) -> bool:
     """
     best = explorer.best()
     plain = Explorer([replace(s, closure_f0={}) for s in explorer.systems], explorer.effort, explorer.options)
-    plain.fit([(best, [[f.values] for f in explorer.fits[best]])], "without closure")
+    plain.fit([(best, explorer.ends(best))], "without closure")
     if best not in plain.fits:
         return False
     pairs = zip(explorer.systems, explorer.fits[best], plain.fits[best], strict=True)
@@ -199,13 +179,12 @@ def _predict(judged: Judged) -> None:
     """Held-out predictions of base, answer, and answer without each of its names."""
     explorer, chosen = judged.explorer, judged.chosen
     nearest = min(explorer.fits, key=lambda s: len(set(s) ^ set(chosen)))
-    explorer.fit([(chosen, [[f.values] for f in explorer.fits[nearest]])], "answer")
+    explorer.fit([(chosen, explorer.ends(nearest))], "answer")
     if chosen not in explorer.fits:
         raise UserError(
             f"fibre {explorer.systems[0].fibre.name}: the model has no solution with all that has "
             "evidence; give more trials"
         )
-    shorter = [tuple(m for m in chosen if m is not n) for n in chosen]
-    explorer.fit([(s, [[f.values] for f in explorer.fits[chosen]]) for s in shorter], "answer but one")
+    shorter = explorer.shorter(chosen, "answer but one")
     if judged.heldout:
-        judged.heldout.predict([(), chosen, *(s for s in shorter if s in explorer.fits)])
+        judged.heldout.predict([(), chosen, *shorter])

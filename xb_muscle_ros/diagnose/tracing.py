@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,6 @@ from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.search.whole import FRAMES, absent
 from xb_muscle_ros.diagnose.searching import Searched
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.problem import Problem
 
 Array = npt.NDArray[np.float64]
@@ -26,28 +25,19 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Traced:
-    """One trial; forces in F0 at the times of its measured samples.
+    """One trial.
 
     Attributes:
         fibre: place of the fibre in the study.
-        residual: what the base left, with the trial's phases.
-        measured_f0, start_f0, before_f0, after_f0: measured, by the fibre file as given, base, answer.
-        heldout_before_f0, heldout_after_f0: predicted; None where nothing was left out.
-        without_f0: the answer without each of its parts, by name: its effect set to nothing, all else as fitted; of a
-            part that is another model, that model's absence fitted anew.
-        plain: for the file.
+        residual: of the base, with the trial's phases.
+        forces: measured, by the fibre file as given, base, answer and held-out predictions; the answer without each of
+            its parts: its effect set to nothing, all else as fitted; of a part that is another model, that model's
+            absence fitted anew.
     """
 
     fibre: int
     residual: Residual
-    measured_f0: Array
-    start_f0: Array
-    before_f0: Array
-    after_f0: Array
-    heldout_before_f0: Array | None
-    heldout_after_f0: Array | None
-    without_f0: Mapping[Name, Array]
-    plain: TrialTraces
+    forces: TrialTraces
 
 
 def traced(study: Searched, chosen: Names, before: Sequence[Around], after: Sequence[Around]) -> list[Traced]:
@@ -58,40 +48,26 @@ def traced(study: Searched, chosen: Names, before: Sequence[Around], after: Sequ
         starts = _start(study, i)
         parts = {name: _without(study, chosen, name, i) for name in chosen}
         residuals = study.recordings[i].residuals(before[i])
-        forces = [
+        fits = [
             [t.measured_f0 - r for t, r in zip(recorded.trials, around.by_trial(), strict=True)]
             for around in (before[i], after[i])
         ]
         for k, trial in enumerate(recorded.trials):
-            without = {n: p[k] for n, p in parts.items() if p is not None}
             held = [heldout.forces(names).get((i, trial.name)) for names in ((), chosen)]
-            plain = TrialTraces(
+            forces = TrialTraces(
                 fibre=study.fibres[i].name,
                 trial=trial.name,
                 time_s=trial.force_time_s,
                 length_l0=np.interp(trial.force_time_s, trial.time_s, trial.length_l0),
                 measured_f0=trial.measured_f0,
                 start_f0=starts[k],
-                before_f0=forces[0][k],
-                after_f0=forces[1][k],
+                before_f0=fits[0][k],
+                after_f0=fits[1][k],
                 heldout_before_f0=held[0],
                 heldout_after_f0=held[1],
-                without_f0={n.value: force for n, force in without.items()},
+                without_f0={n.value: p[k] for n, p in parts.items() if p is not None},
             )
-            found.append(
-                Traced(
-                    i,
-                    residuals[k],
-                    trial.measured_f0,
-                    starts[k],
-                    forces[0][k],
-                    forces[1][k],
-                    held[0],
-                    held[1],
-                    without,
-                    plain,
-                )
-            )
+            found.append(Traced(i, residuals[k], forces))
     return found
 
 
@@ -126,13 +102,7 @@ def _without(study: Searched, chosen: Names, name: Name, i: int) -> list[Array] 
         kept = [j for j, c in enumerate(problem.coordinates) if c.name not in gone]
         fibre = problem.fibre_at(z)
         fibre = replace(fibre, values={**fibre.values, **gone})
-        bare = replace(
-            problem,
-            fibre=fibre,
-            coordinates=tuple(problem.coordinates[j] for j in kept),
-            correction=problem.correction
-            and Correction.level(np.zeros(len(kept)), problem.correction.force, problem.correction.features),
-        )
+        bare = replace(problem, fibre=fibre, coordinates=tuple(problem.coordinates[j] for j in kept))
         return bare.predicted(z[kept])
     except UserError:
         return None
@@ -140,9 +110,9 @@ def _without(study: Searched, chosen: Names, name: Name, i: int) -> list[Array] 
 
 def directed(study: Searched, c: Component, traces: Sequence[Traced]) -> Component:
     """A component of the answer with what it does to the force."""
-    name = Name(c.members[0])
+    name = c.members[0]
     adds: dict[str, list[tuple[Residual, Array]]] = {}
     for t in traces:
-        if name in t.without_f0:
-            adds.setdefault(study.fibres[t.fibre].name, []).append((t.residual, t.after_f0 - t.without_f0[name]))
+        if name in t.forces.without_f0:
+            adds.setdefault(t.forces.fibre, []).append((t.residual, t.forces.adds_f0(name)))
     return replace(c, direction=direction(adds)) if adds else c

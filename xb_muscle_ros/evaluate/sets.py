@@ -8,6 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.coordinates import FITTED_BY_THE_PAPER
 from xb_muscle_ros.models.catalogue import without_effect_line
 from xb_muscle_ros.models.fibre_file import Fibre, base_set, find_fibre_file, load_fibre
 from xb_muscle_ros.models.registry import base_of, compose, model_of_set
@@ -17,10 +18,6 @@ from xb_muscle_ros.models.titles import title_of
 ORDER = ("hill", "hill_se", "2state", "2state_coop", "3state_coop", "4state_coop")
 """Models by the number of their states, simplest first (van der Zee et al. 2026)."""
 REFERENCE_OF_AIC = "hill"
-# What was fitted for each fibre (van der Zee et al. 2026, Methods); the rest came from the literature.
-_FITTED = frozenset(
-    "f k11 k21 k22 dLcrit kon koop kappa n JF vmax kpe Fpe0 kse kse0".split()  # noqa: SIM905 - reads as the paper has it
-)
 
 
 @dataclass(frozen=True)
@@ -52,8 +49,8 @@ class ModelSet:
 
     @property
     def fitted_parameters(self) -> int:
-        """Number of parameters that were fitted for each fibre: k of the AIC."""
-        return sum(row.name in _FITTED for row in compose(self.name).parameters)
+        """Number of parameters that the paper fitted for each fibre: k of the AIC."""
+        return sum(row.name in FITTED_BY_THE_PAPER for row in compose(self.name).parameters)
 
     def provenance(self) -> dict[str, str]:
         """How the set of each fibre was obtained, in the fibre file's words."""

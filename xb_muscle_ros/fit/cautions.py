@@ -140,9 +140,9 @@ def _twins(fitted: Fitted) -> list[str]:
             parameter = next(coordinates[j].name for j in pair if coordinates[j].group is None)
             resting.setdefault(parameter, {})[errors[0]] = None
     if resting:
-        told = ", ".join(f"{name} ({', '.join(errors)})" for name, errors in resting.items())
+        listed = ", ".join(f"{name} ({', '.join(errors)})" for name, errors in resting.items())
         found.append(
-            f"known only as well as the prior of errors of the measurement (correlation above {_TWINS:g}): {told}"
+            f"known only as well as the prior of errors of the measurement (correlation above {_TWINS:g}): {listed}"
         )
     return found
 

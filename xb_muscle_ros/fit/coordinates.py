@@ -18,12 +18,14 @@ from xb_muscle_ros.models.parameters import PARAMETERS
 
 Array = npt.NDArray[np.float64]
 
-# What the paper fitted, over all its models (van der Zee et al. 2026, "Fitted model parameters"), and the shape of a
-# soft parallel spring: where it stays as it starts, a fit makes a measurement artefact of what the spring gets wrong.
-FITTED = (
-    "f", "k11", "k21", "k22", "dLcrit", "kon", "koop", "kappa", "n", "JF", "vmax", "act_max",
-    "kse", "kse0", "kpe", "Fpe0", "lpe0", "pe_sharpness",
+FITTED_BY_THE_PAPER = (
+    "f", "k11", "k21", "k22", "dLcrit", "kon", "koop", "kappa", "n", "JF", "vmax", "kse", "kse0", "kpe", "Fpe0",
 )  # fmt: skip
+"""Over all its models (van der Zee et al. 2026, "Fitted model parameters"): those that its AIC counts."""
+# And what the paper does not name: a sigmoid's activation at full calcium, of which every released set has its own; the
+# shape of a soft parallel spring: where it stays as it starts, a fit makes a measurement artefact of what the spring
+# gets wrong.
+FITTED = (*FITTED_BY_THE_PAPER, "act_max", "lpe0", "pe_sharpness")
 # How far a fit may go from its start where nothing else is said: a factor either way.
 REACH = 100.0
 # Default prior on a logarithmic scale: two thirds within a factor of e of the start, as wide as the released sets of

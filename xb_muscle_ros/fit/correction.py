@@ -23,9 +23,9 @@ class Correction:
     """Difference between two methods at a point and how it changes from there.
 
     Attributes:
-        at: the point, on the moved scale, shape (coordinates,).
+        at: the point, on the moved scale, shape (coordinates,); empty where there are no slopes.
         force: difference of the fibre's force at a trial's samples by the trial's name, F0, shape (samples,).
-        force_slopes: its derivatives by the coordinates, shape (samples, coordinates); trials that have none here are
+        force_slopes: its derivatives by the coordinates, shape (samples, coordinates); none of trials that are
             corrected alike at every point.
         features: difference of each training feature in its standard deviations, shape (features,).
         feature_slopes: its derivatives, shape (features, coordinates).
@@ -38,10 +38,9 @@ class Correction:
     feature_slopes: Array
 
     @staticmethod
-    def level(at: Array, force: Mapping[str, Array], features: Array) -> Correction:
-        """A correction that is the same everywhere: right at the point alone, and computed without slopes."""
-        none = {name: np.zeros((values.size, at.size)) for name, values in force.items()}
-        return Correction(at, force, none, features, np.zeros((features.size, at.size)))
+    def level(force: Mapping[str, Array], features: Array) -> Correction:
+        """A correction that is the same at every point, whatever the coordinates: without slopes."""
+        return Correction(np.empty(0), force, {}, features, np.empty((features.size, 0)))
 
     def of_trial(self, name: str, z: Array) -> Array:
         """What to add to the fibre's force in a trial at a point, F0, before the recording's faults.
@@ -55,7 +54,7 @@ class Correction:
 
     def of_features(self, z: Array) -> Array:
         """What to add to the distances of the training features at a point, in standard deviations."""
-        added: Array = self.features + self.feature_slopes @ (z - self.at)
+        added: Array = self.features + (self.feature_slopes @ (z - self.at) if self.at.size else 0.0)
         return added
 
     def to_json(self) -> dict[str, Any]:
@@ -77,5 +76,5 @@ class Correction:
             force={name: np.array(values) for name, values in row["force"].items()},
             force_slopes={name: np.array(values) for name, values in row["force_slopes"].items()},
             features=np.array(row["features"], dtype=np.float64),
-            feature_slopes=np.array(row["feature_slopes"], dtype=np.float64).reshape(-1, at.size),
+            feature_slopes=np.array(row["feature_slopes"], dtype=np.float64).reshape(len(row["features"]), at.size),
         )

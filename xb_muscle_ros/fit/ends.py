@@ -63,9 +63,7 @@ def of_parameters(coordinates: tuple[Coordinate, ...]) -> Array:
 
     Those of measurement artefacts are left out: how large these are is known from elsewhere.
     """
-    sds = np.array([c.prior_sd if c.group is None else np.inf for c in coordinates])
-    precision: Array = np.where(np.isfinite(sds), sds**-2.0, 0.0)
-    return precision
+    return np.array([c.prior_sd**-2.0 if c.group is None else 0.0 for c in coordinates])
 
 
 def _prior(objective: Objective, z: Array) -> float:
@@ -134,7 +132,7 @@ def quadratic_ends(
 
 
 def _cut(correlation: float, sign: float, z: float, bounds: tuple[float, float], sd: float, wanted: float) -> bool:
-    """Whether another coordinate's bound would cut an interval short: it goes along as far as its bound, then stops."""
+    """Whether another coordinate's bound would cut an interval short: it follows as far as its bound, then stops."""
     along = sign * correlation
     room = (bounds[1] - z if along > 0.0 else z - bounds[0]) / sd
     strength = abs(along)

@@ -10,7 +10,7 @@ import numpy as np
 from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS, ORDINARY, Scope
 
-# An estimate this many standard deviations of its prior from 0 is told.
+# An estimate this many standard deviations of its prior from 0 is reported.
 BEYOND = 2.0
 
 
@@ -40,12 +40,12 @@ def fitted_line(parameters: Sequence[Mapping[str, Any]]) -> str:
     for row in parameters:
         if row["group"] is not None:
             kinds.setdefault(row["name"], []).append(row)
-    told = []
+    named = []
     for name, rows in kinds.items():
         scope, sd = ARTEFACTS[name].scope, rows[0]["prior_sd"]
         many = "" if scope is Scope.STUDY else f"{len(rows)} {scope.value}{'s' * (len(rows) > 1)}, "
-        told.append(f"{name} ({many}{'no prior' if sd is None else f'SD {sd:g}{unit_of(name)}'})")
-    return f"errors of the measurement fitted beside: {', '.join(told)}" if told else ""
+        named.append(f"{name} ({many}{'no prior' if sd is None else f'SD {sd:g}{unit_of(name)}'})")
+    return f"errors of the measurement fitted beside: {', '.join(named)}" if named else ""
 
 
 def beyond_line(parameters: Sequence[Mapping[str, Any]], trials: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -57,14 +57,16 @@ def beyond_line(parameters: Sequence[Mapping[str, Any]], trials: Sequence[Mappin
     sds = {row["name"]: row["prior_sd"] for row in parameters if row["group"] is not None}
     found = [(row["name"], row["group"], row["value"]) for row in parameters if row["group"] is not None]
     found += [(name, row["trial"], value) for row in trials for name, value in row.get("own_faults", {}).items()]
-    told = [
+    beyond = [
         f"{name}{f'[{group}]' if group else ''} {value:.3g}{unit_of(name)} ({abs(value) / sds[name]:.1f} SD)"
         for name, group, value in found
         if sds[name] is not None and abs(value) > BEYOND * sds[name]
     ]
-    if not told:
+    if not beyond:
         return []
-    return [f"beyond what is ordinary ({BEYOND:g} SD): {', '.join(told)}; look at the recording, or the model lacks it"]
+    return [
+        f"beyond what is ordinary ({BEYOND:g} SD): {', '.join(beyond)}; look at the recording, or the model lacks it"
+    ]
 
 
 def unit_of(name: str) -> str:

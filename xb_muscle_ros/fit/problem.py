@@ -21,6 +21,7 @@ from xb_muscle_ros.measurement.recording import given_calcium, given_length, rec
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.plain import fibre_from_plain, fibre_to_plain
+from xb_muscle_ros.simulation.offline import outputs
 
 Array = npt.NDArray[np.float64]
 
@@ -94,12 +95,8 @@ class Problem:
             length = given_length(trial.length_l0, faults)
             calcium = given_calcium(trial.calcium_um, faults)
             # Trials that begin alike settle alike, which on a strain grid is most of the work.
-            begin = (float(length[0]), float(calcium[0]))
             with naming(f"trial {trial.name}"):
-                if begin not in settled:
-                    settled[begin] = muscle.settle(*begin)
-                states = muscle.run(settled[begin], trial.dt_s, length, calcium)
-            force = muscle.outputs_of(states)["force_f0"]
+                force = outputs(muscle, trial.dt_s, length, calcium, settled=settled)["force_f0"]
             found.append(force if self.correction is None else force + self.correction.of_trial(trial.name, z))
         return found
 
@@ -126,11 +123,15 @@ class Problem:
             if c.name == "pca_shift" and c.group is not None and c.group.startswith("pCa ")
         }
 
+    @property
+    def information(self) -> Array:
+        """Of the priors, 1/SD², shape (coordinates,); 0 where there is none."""
+        return np.array([c.prior_sd**-2.0 for c in self.coordinates])
+
     def prior(self, z: Array) -> Array:
         """Distance from the priors in standard deviations, shape (coordinates,); 0 where there is none."""
         means = np.array([c.prior_mean for c in self.coordinates])
-        sds = np.array([c.prior_sd for c in self.coordinates])
-        distance: Array = np.where(np.isfinite(sds), (z - means) / sds, 0.0)
+        distance: Array = (z - means) * np.sqrt(self.information)
         return distance
 
     def to_json(self) -> dict[str, Any]:

@@ -118,7 +118,7 @@ def _stepped(
 
 def _exactly(asked: Problem, here: Difference, point: Solution, scale: Scale) -> Solution:
     """A point with cost and RMSD by the method itself, from its difference there."""
-    exact = Correction.level(point.z, here.force, here.features)
+    exact = Correction.level(here.force, here.features)
     training = Training(replace(fast_form(asked), correction=exact))
     cost = float(0.5 * np.sum(Objective(training, scale).residuals(point.z) ** 2))
     return point._replace(cost=cost, rmsd_f0=_root_mean_square([training.force(point.z) - training.measured]))

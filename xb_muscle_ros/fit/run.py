@@ -20,7 +20,7 @@ from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.rounds import refined
 from xb_muscle_ros.fit.solve import Objective, Solution
 from xb_muscle_ros.fit.training import Training, finite_start
-from xb_muscle_ros.fit.uncertainty import Curvature, Side, curvature, profile_side
+from xb_muscle_ros.fit.uncertainty import Curvature, ProfileEnd, curvature, profile_side
 from xb_muscle_ros.progress import Progress
 from xb_muscle_ros.work import Options, run, stream
 
@@ -72,7 +72,7 @@ class Fitted:
     scale: Scale
     starts: tuple[Solution | None, ...]
     shape: Curvature
-    sides: Mapping[int, tuple[Side, Side]]
+    sides: Mapping[int, tuple[ProfileEnd, ProfileEnd]]
     settled: bool
     mismatch_f0: float = 0.0
     method_settled: bool = True
@@ -107,7 +107,7 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
     best = min((s for s in starts if s is not None), key=lambda s: s.cost, default=None)
     if best is None:
         raise UserError(f"none of {len(starts)} starts has a solution: {lost[0]}; start from another fibre file")
-    sides: dict[int, tuple[Side, Side]] = {}
+    sides: dict[int, tuple[ProfileEnd, ProfileEnd]] = {}
     settled, known = False, None
     for _ in range(_RESTARTS):
         found = refined(problem, best, known, options)
@@ -117,7 +117,7 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
         if settings.level is None:
             settled = True
             break
-        sides, better = _profiles(found.problem, best, scale, settings.level, options)
+        sides, better = _profiles(found.problem, best, scale, shape, settings.level, options)
         settled = better is None
         if better is None:
             break
@@ -130,8 +130,7 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
 def profile_task(task: Mapping[str, Any]) -> dict[str, Any]:
     """One side of one profile."""
     objective = Objective(Training(Problem.from_json(task["problem"])), Scale(*task["scale"]))
-    best = solution_from_json(task["best"])
-    shape = curvature(objective, best.z)
+    best, shape = solution_from_json(task["best"]), Curvature(*(np.array(row) for row in task["shape"]))
     return profile_side(objective, best, task["index"], task["up"], shape, task["level"])._asdict()
 
 
@@ -178,13 +177,14 @@ def _descended(tasks: Sequence[Mapping[str, Any]], options: Options) -> tuple[li
 
 
 def _profiles(
-    problem: Problem, best: Solution, scale: Scale, level: float, options: Options
-) -> tuple[dict[int, tuple[Side, Side]], Array | None]:
+    problem: Problem, best: Solution, scale: Scale, shape: Curvature, level: float, options: Options
+) -> tuple[dict[int, tuple[ProfileEnd, ProfileEnd]], Array | None]:
     """Both sides of every model parameter's profile, or a better point that one of them met."""
     chosen = [j for j, c in enumerate(problem.coordinates) if c.group is None]
     task = {"problem": problem.to_json(), "best": solution_to_json(best), "scale": list(scale), "level": level}
+    task["shape"] = [row.tolist() for row in shape]
     tasks = [{**task, "index": j, "up": up} for j in chosen for up in (False, True)]
     rows = run(profile_task, tasks, replace(options, label="profiles"))
-    sides = [Side(r["end"], r["ended_by"], [(x, y) for x, y in r["points"]], r["better"]) for r in rows]
+    sides = [ProfileEnd(r["end"], r["ended_by"], [(x, y) for x, y in r["points"]], r["better"]) for r in rows]
     better = next((np.array(side.better) for side in sides if side.better is not None), None)
     return {j: (sides[2 * k], sides[2 * k + 1]) for k, j in enumerate(chosen)}, better

@@ -70,8 +70,7 @@ class Objective:
 
     def slopes(self, z: Array) -> Array:
         """Derivatives of `residuals`, shape (samples + features + coordinates, coordinates)."""
-        sds = np.array([c.prior_sd for c in self.training.problem.coordinates])
-        prior = np.diag(np.where(np.isfinite(sds), 1.0 / sds, 0.0))
+        prior = np.diag(np.sqrt(self.training.problem.information))
         force, features = self.training.slopes(z)
         return np.vstack([force * self.weights()[:, None], features, prior])
 

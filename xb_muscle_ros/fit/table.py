@@ -18,16 +18,16 @@ def table(found: Mapping[str, Any]) -> str:
     """Lines for a terminal."""
     lines = [f"{'parameter':24s} {'start':>11s} {'fitted':>11s}  {'interval':25s} unit"]
     kinds = Counter(row["name"] for row in found["parameters"])
-    told: set[str] = set()
+    listed: set[str] = set()
     for row in found["parameters"]:
         if row["group"] is not None and kinds[row["name"]] > _MANY and ARTEFACTS[row["name"]].scope is Scope.TRIAL:
-            if row["name"] not in told:
+            if row["name"] not in listed:
                 values = [r["value"] for r in found["parameters"] if r["name"] == row["name"]]
                 spread = f"{min(values):.4g} to {max(values):.4g}"
                 lines.append(
                     f"{row['name']:24s} {row['start']:11.5g} {spread:>25s}  of {len(values)} trials {row['unit']}"
                 )
-            told.add(row["name"])
+            listed.add(row["name"])
             continue
         label = f"{row['name']}[{row['group']}]" if row["group"] else row["name"]
         interval = f"{_end(row, 0)} to {_end(row, 1)}"

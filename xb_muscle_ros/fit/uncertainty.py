@@ -1,10 +1,10 @@
-"""How well a fit knows its coordinates: covariance, correlation, and intervals by profile likelihood.
+"""How well a fit knows its coordinates: covariance, correlation, and profile likelihood intervals.
 
-Samples count as correlated (see `noise`): the covariance is the sandwich H^-1 V H^-1 of curvature H and covariance V of
-the score, and a profile's threshold is scaled by what this makes of the coordinate's variance, as for composite
-likelihoods (Varin, Reid and Firth, Statistica Sinica 21 (2011) 5-42). Where model and data differ by more than noise
-the residuals are larger and slower, and so the intervals wider; but no interval knows of an error that all trials
-share.
+Samples count as correlated (see `scores.noise.residual`): the covariance is the sandwich H^-1 V H^-1 of curvature H and
+covariance V of the score, and a profile's threshold is scaled by what this makes of the coordinate's variance, as for
+composite likelihoods (Varin, Reid and Firth, Statistica Sinica 21 (2011) 5-42). Where model and data differ by more
+than noise the residuals are larger and slower, and so the intervals wider; but no interval knows of an error that all
+trials share.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ import numpy.typing as npt
 from scipy.stats import chi2
 
 from xb_muscle_ros.fit.ends import BOUND, UNSETTLED, of_parameters, profile_end
-from xb_muscle_ros.fit.noise import noise_autocovariances, score_covariance
+from xb_muscle_ros.fit.linear_fit import LinearFit
+from xb_muscle_ros.fit.noise import noise_at
 from xb_muscle_ros.fit.solve import Objective, Solution, descend
 
 Array = npt.NDArray[np.float64]
@@ -47,31 +48,14 @@ class Curvature(NamedTuple):
 def curvature(objective: Objective, z: Array) -> Curvature:
     """Curvature and covariance at a point."""
     training = objective.training
-    (slopes, of_features), weights = training.slopes(z), objective.weights()
-    residual = training.force(z) - training.measured
-    sds = np.array([c.prior_sd for c in training.problem.coordinates])
-    prior = np.diag(np.where(np.isfinite(sds), sds**-2.0, 0.0))
-    weighted = slopes * weights[:, None]
+    slopes = of_force, of_features = training.slopes(z)
     # Features and priors are taken at their word: independent, with the standard deviations they come with.
-    certain = of_features.T @ of_features + prior
-    h = weighted.T @ weighted + certain
-    here = training.slices()
-    score = [slopes[s] * weights[s][:, None] ** 2 for s in here]
-    # In units of each coordinate's own curvature, so that the inverse does not depend on units.
-    unit = np.sqrt(np.maximum(np.diag(h), 1e-12))
-    values, vectors = np.linalg.eigh(h / np.outer(unit, unit))
-    seen = values > 1e-8 * values[-1]
-    inverse = (vectors / np.where(seen, values, np.inf)) @ vectors.T / np.outer(unit, unit)
-
-    def left(noise: Array) -> Array:
-        """What the fit, taken as linear, leaves of noise."""
-        taken: Array = slopes @ (inverse @ (weighted.T @ (noise * weights[:, None])))
-        return noise - taken
-
-    noise = noise_autocovariances([residual[s] for s in here], left)
-    v = score_covariance(score, noise, z.size) + certain
+    certain = of_features.T @ of_features + np.diag(training.problem.information)
+    fit = LinearFit(of_force, objective.weights(), certain)
+    noise = noise_at(training, z, slopes)
+    v = certain + sum(noise.covariance_of_sums(i, fit.score[s]) for i, s in enumerate(training.slices()))
+    inverse, weak = fit.inverse, fit.weak
     covariance = inverse @ v @ inverse
-    weak = np.sqrt(np.sum(vectors[:, ~seen] ** 2, axis=1)) > 0.1
     inflation = np.diag(covariance) / np.maximum(np.diag(inverse), 1e-300)
     # Along the direction in which a coordinate's profile goes.
     along = inverse / np.sqrt(np.maximum(np.diag(inverse), 1e-300))
@@ -79,7 +63,7 @@ def curvature(objective: Objective, z: Array) -> Curvature:
     return Curvature(covariance, np.where(weak, 1.0, inflation), weak, share)
 
 
-class Side(NamedTuple):
+class ProfileEnd(NamedTuple):
     """One end of an interval.
 
     Attributes:
@@ -97,7 +81,7 @@ class Side(NamedTuple):
 
 def profile_side(
     objective: Objective, best: Solution, index: int, up: bool, shape: Curvature, level: float = 0.95
-) -> Side:
+) -> ProfileEnd:
     """Follow one coordinate from the best point, all others moving along, to where the likelihood ratio ends it.
 
     Args:
@@ -118,9 +102,9 @@ def profile_side(
     inflation = float(shape.inflation[index])
     reaches: dict[float, Solution] = {}
 
-    def ended(target: float) -> Side:
+    def ended(target: float) -> ProfileEnd:
         what = profile_end(objective, best, reaches[target], index, inflation, wanted)
-        return Side(target, what, points, None)
+        return ProfileEnd(target, what, points, None)
 
     distance = wanted * sd if 0.0 < sd < 1e3 else 0.5
     reached = origin
@@ -133,7 +117,7 @@ def profile_side(
         found = descend(objective, guess, held=index, most=30, tolerance=1e-4)
         gain = 2.0 * (found.cost - best.cost) / inflation
         if gain < -0.02:
-            return Side(target, UNSETTLED, points, found.z.tolist())
+            return ProfileEnd(target, UNSETTLED, points, found.z.tolist())
         root = float(np.sqrt(max(gain, 0.0)))
         points.append((target, root))
         reaches[target] = found
@@ -141,13 +125,13 @@ def profile_side(
         if abs(root - wanted) < _CLOSE:
             return ended(target)
         if at_bound and root < wanted:
-            return Side(bound, BOUND, points, None)
+            return ProfileEnd(bound, BOUND, points, None)
         distance = _next_distance(points, origin, wanted)
     inside = [p for p in points if p[1] >= wanted]
     # The search did not settle: the nearest point that is out, if there is one.
     if inside:
         return ended(min(inside, key=lambda p: abs(p[0] - origin))[0])
-    return Side(reached, UNSETTLED, points, None)
+    return ProfileEnd(reached, UNSETTLED, points, None)
 
 
 def _next_distance(points: list[tuple[float, float]], origin: float, wanted: float) -> float:

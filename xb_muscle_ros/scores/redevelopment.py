@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import curve_fit
 
-from xb_muscle_ros.scores.estimate import Missing, rounded
-from xb_muscle_ros.scores.noise.autocovariance import autocovariance, covariance_of_sums
+from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.scores.noise.hum import hum
+from xb_muscle_ros.scores.noise.pieces import Piece, steps_evenly
+from xb_muscle_ros.scores.noise.trials import by_curves
 from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.trial import Array
 
@@ -36,7 +36,7 @@ class Redevelopment(NamedTuple):
 
     Attributes:
         k_per_s: k_tr, 1/s.
-        se_per_s: its standard error, 1/s, from the autocovariance of what the curve leaves of the force.
+        se_per_s: its standard error, 1/s, from the noise behind what the curve leaves of the force.
         start_f0, end_f0: force at the begin of the fit and where it tends to, F0.
         rmsd_f0: of the force from the curve, F0.
         from_s, to_s: what was fitted, in the clock of the samples, s.
@@ -123,19 +123,17 @@ def redevelopment(
         return Missing(f"the exponential that fits best has a rate of {found[0]:.3g} 1/s; allowed is 0 to 200")
     residual = force - _rise(since, *found)
     # How the rate answers to the force at each sample.
-    weights = np.linalg.pinv(_slopes(since, *found))[0][:, None]
+    weights = np.linalg.pinv(_slopes(since, *found))[0]
     step_s = float(np.mean(np.diff(t)))
     lines, rest = hum(step_s, residual)
-    gamma = autocovariance(rest, t.size)
-    for line in lines:
-        gamma = gamma + line.autocovariance(step_s * np.arange(t.size))
-    variance = float(covariance_of_sums(weights, gamma)[0, 0])
-    se = math.sqrt(max(variance, 0.0) * t.size / (t.size - 3))
+    curve, _ = np.linalg.qr(_slopes(since, *found))
+    beside = by_curves({"": [Piece(t, rest, curve)]}, {"": steps_evenly(t)})
+    se = ForceNoise(beside[""], step_s, lines).of_sum(weights, t)
     if noise is not None:
-        se = max(se, noise.of_sum(weights[:, 0], t))
+        se = max(se, noise.of_sum(weights, t))
     return Redevelopment(
         k_per_s=float(found[0]),
-        se_per_s=rounded(se),
+        se_per_s=se,
         start_f0=float(found[1]),
         end_f0=float(found[2]),
         rmsd_f0=float(np.sqrt(np.mean(residual**2))),

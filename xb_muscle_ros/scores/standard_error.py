@@ -13,10 +13,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import matmul_toeplitz
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.scores.estimate import rounded
-from xb_muscle_ros.scores.noise.autocovariance import covariance_of_sums
 from xb_muscle_ros.scores.noise.hum import Line, hum
 from xb_muscle_ros.scores.noise.model import Source, TrialNoise
 from xb_muscle_ros.scores.noise.pieces import evenly_sampled
@@ -58,7 +58,9 @@ class ForceNoise:
             weights: shape (n, sums).
             time_s: of the samples, shape (n,), s.
         """
-        return covariance_of_sums(weights, self.autocovariance(time_s))
+        found = weights.T @ matmul_toeplitz(self.autocovariance(time_s), weights)
+        symmetric: Array = 0.5 * (found + found.T)
+        return symmetric
 
     def of_sum(self, weights: Array, time_s: Array) -> float:
         """Standard error of one weighted sum of samples, weights of shape (n,)."""

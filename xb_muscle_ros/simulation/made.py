@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.signal import lfilter
 
 from xb_muscle_ros.measurement.recording import given_calcium, given_length, recorded_force
 from xb_muscle_ros.models.muscle import Muscle
@@ -13,25 +14,23 @@ from xb_muscle_ros.trials.trial import Array, Trial
 
 # Of a real recording at 1 kHz (rat soleus fibre 18Dec2017a): SD 0.03 to 0.14 % F0, lag-1 autocorrelation 0.91 to 0.98.
 NOISE_SD_F0 = 1e-3
-NOISE_MEMORY = 0.95
+NOISE_AUTOCORRELATION = 0.95
 
 
-def coloured_noise(random: np.random.Generator, n: int, sd: float = NOISE_SD_F0, memory: float = NOISE_MEMORY) -> Array:
+def coloured_noise(
+    random: np.random.Generator, n: int, sd: float = NOISE_SD_F0, autocorrelation: float = NOISE_AUTOCORRELATION
+) -> Array:
     """First-order autoregressive noise.
 
     Args:
         random: where it comes from.
         n: samples.
         sd: standard deviation, F0.
-        memory: correlation of one sample with the next, 0 up to below 1.
+        autocorrelation: correlation of one sample with the next, 0 up to below 1.
     """
-    fresh = random.normal(size=n) * sd * np.sqrt(1.0 - memory**2)
-    fresh[0] = random.normal() * sd
-    out = np.empty(n)
-    last = 0.0
-    for k in range(n):
-        last = memory * last + float(fresh[k])
-        out[k] = last
+    innovations = random.normal(size=n) * sd * np.sqrt(1.0 - autocorrelation**2)
+    innovations[0] = random.normal() * sd
+    out: Array = lfilter([1.0], [1.0, -autocorrelation], innovations)
     return out
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
 
 import numpy as np
 
@@ -34,6 +34,40 @@ def calcium_per_step(trial: Trial) -> Array:
     return held
 
 
+def outputs(
+    muscle: Muscle,
+    dt_s: Array,
+    length_l0: Array,
+    calcium_um: Array,
+    substeps: int = 1,
+    settle_s: float | None = None,
+    settled: MutableMapping[tuple[float, float], Array] | None = None,
+) -> Mapping[str, Array]:
+    """Settle isometrically at the first sample, step from sample to sample, and read the outputs.
+
+    Args:
+        muscle: the fibre.
+        dt_s: between samples, shape (n - 1,), s.
+        length_l0: length change at the samples, linear between them, shape (n,), L0.
+        calcium_um: calcium that acts in the step that ends at a sample, shape (n,), µM.
+        substeps: steps between two samples; 1 is what the node does.
+        settle_s: time to settle, s; None until at rest.
+        settled: settled states by length and calcium, which are looked up here and added to.
+
+    Returns:
+        See `Muscle.outputs_of`, each of shape (n,).
+
+    Raises:
+        UserError: length or calcium out of range.
+        StateViolation: see `Muscle.step`.
+    """
+    begin = (float(length_l0[0]), float(calcium_um[0]))
+    known = {} if settled is None else settled
+    if begin not in known:
+        known[begin] = muscle.settle(*begin, settle_s)
+    return muscle.outputs_of(muscle.run(known[begin], dt_s, length_l0, calcium_um, substeps))
+
+
 def simulate_trial(muscle: Muscle, trial: Trial, substeps: int = 1, settle_s: float | None = None) -> Simulated:
     """Settle isometrically at the first sample, then step from sample to sample.
 
@@ -47,19 +81,16 @@ def simulate_trial(muscle: Muscle, trial: Trial, substeps: int = 1, settle_s: fl
         UserError: no calcium at the start, or length or calcium out of range; names the trial.
         StateViolation: see `Muscle.step`; names the trial.
     """
-    length = trial.length_change_l0
     calcium = calcium_per_step(trial)
     # Whole nanoseconds, as message stamps have them: the node computes the same differences.
     dt_s = np.diff(to_ns(trial.time_s)) / 1e9
     with naming(f"trial {trial.facts.trial}"):
-        state = muscle.settle(float(length[0]), float(calcium[0]), settle_s)
-        states = muscle.run(state, dt_s, length, calcium, substeps)
-    return as_simulated(muscle, trial, trial.time_s, states)
+        out = outputs(muscle, dt_s, trial.length_change_l0, calcium, substeps, settle_s)
+    return as_simulated(trial, trial.time_s, out)
 
 
-def as_simulated(muscle: Muscle, trial: Trial, time_s: Array, states: Array) -> Simulated:
-    """States of a trial in SI units."""
-    out = muscle.outputs_of(states)
+def as_simulated(trial: Trial, time_s: Array, out: Mapping[str, Array]) -> Simulated:
+    """Outputs of a trial in SI units."""
     reference = trial.facts.reference_length_m
     return Simulated(
         time_s=time_s,

@@ -8,15 +8,15 @@ import numpy as np
 from made_trials import given_fibre
 
 from xb_muscle_ros.diagnose.names import Name
-from xb_muscle_ros.diagnose.search.descent import TOLD, Fit
+from xb_muscle_ros.diagnose.search.descent import Fit
 from xb_muscle_ros.diagnose.search.explore import Effort, Explorer
-from xb_muscle_ros.diagnose.search.system import Names, System, ordered
+from xb_muscle_ros.diagnose.search.system import INDEPENDENT, Names, System, ordered
 from xb_muscle_ros.work import Options
 
 NOISE_F0 = 1e-3
 COUNT = 100
 # Independent residuals.
-TOLD_F0 = TOLD * COUNT
+EFFECTIVE = INDEPENDENT * COUNT
 DRAG, TITIN, STIFFNESS = Name.VISCOUS_DRAG, Name.ACTIVE_TITIN, Name.STATIC_CALCIUM_STIFFNESS
 VISCO, LATTICE, SHIFT = Name.PASSIVE_VISCOELASTICITY, Name.LATTICE_SPACING, Name.PCA_SHIFT
 
@@ -33,7 +33,7 @@ def fit(names: Sequence[Name], log_likelihood: float, occam: float = 0.0, mean_s
     """A fit of such a cost: residuals that are as large as it says, or priors that make up for it."""
     # Every name takes off more than what is of use to anyone.
     mean_square = 1e-4 * 0.5 ** len(names) if mean_square_f0 is None else mean_square_f0
-    data = 0.5 * TOLD_F0 * float(np.log(NOISE_F0**2 + mean_square))
+    data = 0.5 * EFFECTIVE * float(np.log(NOISE_F0**2 + mean_square))
     return Fit(ordered(names), {}, mean_square, -log_likelihood - data, occam, {}, 1)
 
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from by_hand import DRAG, LATTICE, NOISE_F0, SHIFT, STIFFNESS, TITIN, TOLD_F0, VISCO, explorer, fit, with_odds
+from by_hand import DRAG, EFFECTIVE, LATTICE, NOISE_F0, SHIFT, STIFFNESS, TITIN, VISCO, explorer, fit, with_odds
 
 from xb_muscle_ros.diagnose.inference.averaging import averaged, families, grouped
 from xb_muscle_ros.diagnose.names import Name
@@ -46,13 +46,13 @@ def test_a_set_that_only_a_line_tells_of_counts_less_than_the_best_fitted_one() 
     e = explorer({(): [fit((), 0.0, mean_square_f0=1e-5)]})
     e.promised[DRAG,] = (4e-6,)
     found = averaged(e)
-    by_hand = 0.5 * TOLD_F0 * math.log((NOISE_F0**2 + 1e-5) / (NOISE_F0**2 + 4e-6)) - 1.5 + math.log(0.1)
+    by_hand = 0.5 * EFFECTIVE * math.log((NOISE_F0**2 + 1e-5) / (NOISE_F0**2 + 4e-6)) - 1.5 + math.log(0.1)
     assert by_hand > 0.0
     # It may not be the best by what it only promises.
     assert found.log_odds([DRAG]) == pytest.approx(-1.0)
     assert list(found.fitted) == [True, False]
     e.promised[DRAG,] = (9.5e-6,)
-    little = 0.5 * TOLD_F0 * math.log((NOISE_F0**2 + 1e-5) / (NOISE_F0**2 + 9.5e-6)) - 1.5 + math.log(0.1)
+    little = 0.5 * EFFECTIVE * math.log((NOISE_F0**2 + 1e-5) / (NOISE_F0**2 + 9.5e-6)) - 1.5 + math.log(0.1)
     assert averaged(e).log_odds([DRAG]) == pytest.approx(little)
     # What would make the residual larger promises nothing.
     e.promised[DRAG,] = (3e-5,)

@@ -10,7 +10,7 @@ from made_trials import fitted_trials, given_fibre, trials_of, truth
 
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.noise.residuals import Around, Recordings
-from xb_muscle_ros.diagnose.search.descent import TOLD, Fit
+from xb_muscle_ros.diagnose.search.descent import Fit
 from xb_muscle_ros.diagnose.search.system import System
 from xb_muscle_ros.scores.noise.trials import noise_of
 from xb_muscle_ros.trials.trial import Trial
@@ -37,7 +37,7 @@ def recordings(trials: list[Trial]) -> Recordings:
 
 
 def around(every: System, system: System, fit: Fit) -> Around:
-    return Around.of(every, fit, TOLD * float(np.sum(system.weights)))
+    return Around.of(every, fit, system.effective_samples)
 
 
 def test_the_residual_is_measured_less_simulated_and_about_that_of_the_thinned_fit(
@@ -59,7 +59,7 @@ def test_the_residual_is_measured_less_simulated_and_about_that_of_the_thinned_f
 def test_weights_tell_how_many_independent_residuals_there_are(every: System, system: System, base_fit: Fit) -> None:
     found = around(every, system, base_fit)
     scale = float(np.sqrt(np.mean(found.residual_f0**2)))
-    assert float(np.sum(found.fit.weights**2)) * scale**2 == pytest.approx(TOLD * float(np.sum(system.weights)))
+    assert float(np.sum(found.fit.weights**2)) * scale**2 == pytest.approx(system.effective_samples)
     # Coordinates at a bound do not move.
     moved = replace(base_fit, values={**base_fit.values, "f": 1e12})
     assert around(every, system, moved).fit.slopes.shape[1] < found.fit.slopes.shape[1]

@@ -12,14 +12,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from xb_muscle_ros.diagnose.noise.cells import Residual, cut, rms
-from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.diagnose.noise.significance import family_wise, null_residuals, significance, step_down
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.scores.noise.model import NoiseModel
 from xb_muscle_ros.scores.noise.windows import Window
 from xb_muscle_ros.simulation.made import coloured_noise
 
 Array = npt.NDArray[np.float64]
+
+
+def nothing_fitted(samples: int) -> LinearFit:
+    return LinearFit(np.zeros((samples, 0)), np.ones(samples), np.zeros(0))
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +57,7 @@ def test_false_alarms_on_noise_that_was_fitted(study: Any, known: NoiseModel) ->
 
     null = np.concatenate([sizes(x) for x in null_residuals(residuals, study.fit, known, 200, 1)], axis=1)
     noise = np.column_stack([study.noise(random) for _ in range(200)])
-    p = np.array([family_wise(found, null).min() for found in sizes(study.fit.left(noise)).T])
+    p = np.array([family_wise(found, null).min() for found in sizes(study.fit.residual(noise)).T])
     # Binomial: 18 and more of 200 at 5 % have a chance of 1 %.
     assert np.count_nonzero(p <= 0.05) <= 18
     assert 50 <= np.count_nonzero(p <= 0.5) <= 130
@@ -74,7 +78,7 @@ def test_false_alarms_where_windows_are_short(study: Any, model_of: Any) -> None
 def test_without_the_refit_the_null_would_be_wrong(study: Any, known: NoiseModel) -> None:
     """The fit takes some of the noise: against unfitted noise what it leaves looks small."""
     residuals = study.after(study.noise(_rng(1)))
-    plain = significance(residuals, LinearFit.nothing(sum(study.sizes)), known, draws=100)
+    plain = significance(residuals, nothing_fitted(sum(study.sizes)), known, draws=100)
     refitted = significance(residuals, study.fit, known, draws=100)
     assert refitted.overall_null_f0 < 0.95 * plain.overall_null_f0
 

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.diagnose.names import Name
-from xb_muscle_ros.diagnose.search.descent import TOLD, Descent, Fit
-from xb_muscle_ros.diagnose.search.explore import fitted
-from xb_muscle_ros.diagnose.search.system import System
+from xb_muscle_ros.diagnose.search.descent import Descent, Fit, fitted
+from xb_muscle_ros.diagnose.search.system import INDEPENDENT, System
 from xb_muscle_ros.errors import UserError
 
 DRAG = Name.VISCOUS_DRAG
@@ -34,8 +33,8 @@ def test_drag_lowers_the_cost_by_far_more_than_it_is_worth_by_chance(
 ) -> None:
     assert base_fit.rmsd_f0 > 3.0 * drag_fit.rmsd_f0
     assert base_fit.cost(system) - drag_fit.cost(system) > 10.0
-    told = TOLD * float(np.sum(system.weights))
-    by_hand = 0.5 * told * np.log(system.noise_f0**2 + base_fit.mean_square_f0) + base_fit.prior
+    effective = INDEPENDENT * float(np.sum(system.weights))
+    by_hand = 0.5 * effective * np.log(system.noise_f0**2 + base_fit.mean_square_f0) + base_fit.prior
     assert base_fit.cost(system) == pytest.approx(by_hand)
     assert base_fit.cost(system, 0.02) > base_fit.cost(system)
 

@@ -10,8 +10,7 @@ import pytest
 from made_trials import fitted_trials, given_fibre, trials_of, truth
 
 from xb_muscle_ros.diagnose.names import Name
-from xb_muscle_ros.diagnose.search.descent import Fit
-from xb_muscle_ros.diagnose.search.explore import fitted
+from xb_muscle_ros.diagnose.search.descent import Descent, Fit, Point, fitted
 from xb_muscle_ros.diagnose.search.promise import BLIND, Linear, promise
 from xb_muscle_ros.diagnose.search.system import System
 
@@ -86,3 +85,42 @@ def test_a_fault_that_no_set_has_by_itself_is_promised_too(system: System, linea
     found = promise(linear, Name.TRANSDUCER_LAG)
     assert np.isfinite(found.gain)
     assert "transducer_lag" in found.starts[0]
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_joint_step_is_that_of_least_squares(seed: int) -> None:
+    """A straight model: moves are those of stacked least squares, and the gain is the cost before less that after."""
+    random = np.random.default_rng(seed)
+    n, own, more = 60, 3, 2
+    weights, slopes, columns = random.uniform(0.2, 1.0, n), random.normal(size=(n, own)), random.normal(size=(n, more))
+    system = System(given_fibre(), (), weights, 1e-3)
+    z, means, information = random.normal(size=own), random.normal(size=own), random.uniform(0.5, 2.0, own)
+    residual, of_more = random.normal(size=n), random.uniform(0.5, 2.0, more)
+    descent, linear = Descent.__new__(Descent), Linear.__new__(Linear)
+    descent.system, descent.total, descent.information = system, float(weights.sum()), information
+    descent.problem = SimpleNamespace(coordinates=[SimpleNamespace(prior_mean=m) for m in means])  # type: ignore[assignment]
+    descent.of_features = np.zeros((0, own))
+    mean_square = float(weights @ residual**2) / descent.total
+    linear.system, linear.descent, linear.slopes = system, descent, slopes
+    linear.point = Point(z, residual, mean_square, np.sqrt(information) * (z - means), np.empty(0))
+    linear.free = np.array([True, True, False])
+
+    moves, found, gain, after = linear.solve(columns, of_more, np.zeros(more))
+
+    samples = np.sqrt(system.effective_samples * weights / descent.total / (system.noise_f0**2 + mean_square))
+    roots = np.sqrt(np.concatenate([information[:2], of_more]))
+    stacked = np.vstack([np.hstack([slopes[:, :2], columns]) * samples[:, None], np.diag(roots)])
+    target = -np.concatenate([residual * samples, roots * np.concatenate([(z - means)[:2], np.zeros(more)])])
+    step = np.linalg.lstsq(stacked, target, rcond=None)[0]
+    assert moves == pytest.approx([*step[:2], 0.0], rel=1e-6)
+    assert found == pytest.approx(step[2:], rel=1e-6)
+
+    def cost(left: np.ndarray, at: np.ndarray, of_columns: np.ndarray) -> float:
+        square = float(weights @ left**2) / descent.total
+        priors = 0.5 * float(information @ (at - means) ** 2 + of_more @ of_columns**2)
+        return priors + 0.5 * system.effective_samples * float(np.log(system.noise_f0**2 + square))
+
+    left = residual + slopes @ moves + columns @ found
+    assert after == pytest.approx(float(weights @ left**2) / descent.total, rel=1e-9)
+    assert gain == pytest.approx(cost(residual, z, np.zeros(more)) - cost(left, z + moves, found), rel=1e-6)
+    assert gain > 0.0

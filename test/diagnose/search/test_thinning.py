@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from xb_muscle_ros.diagnose.search.thinning import MEMORY_S, thinned
+from xb_muscle_ros.diagnose.search.thinning import INDEPENDENT_S, thinned
 from xb_muscle_ros.fit.data import FitTrial
 
 Array = npt.NDArray[np.float64]
@@ -98,13 +98,13 @@ def _steps(edges: Array, times: Array) -> list[npt.NDArray[np.bool_]]:
 
 
 def test_weights_count_independent_residuals() -> None:
-    """Right after a corner one for each `MEMORY_S`; later fewer; a trial's own weight multiplies."""
+    """Right after a corner one for each `INDEPENDENT_S`; later fewer; a trial's own weight multiplies."""
     time_s, length = protocol()
     thin, weights = thinned(trial_of(time_s, length))
     after = (thin.force_time_s > 0.2) & (thin.force_time_s < 0.212)
-    assert np.sum(weights[after]) == pytest.approx(0.012 / MEMORY_S, rel=0.35)
+    assert np.sum(weights[after]) == pytest.approx(0.012 / INDEPENDENT_S, rel=0.35)
     late = (thin.force_time_s > 0.8) & (thin.force_time_s < 1.0)
-    assert np.sum(weights[late]) < 0.2 / MEMORY_S * 0.5
+    assert np.sum(weights[late]) < 0.2 / INDEPENDENT_S * 0.5
     assert thinned(trial_of(time_s, length, weight=0.25)).weights == pytest.approx(0.25 * weights)
 
 

@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from xb_muscle_ros.diagnose.noise.cells import Residual
-from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.diagnose.noise.significance import significance
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0, NoiseModel, Source
 from xb_muscle_ros.scores.noise.trials import by_windows, completed, noise_of
 from xb_muscle_ros.scores.noise.windows import Window
@@ -29,6 +29,10 @@ from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
 Array = npt.NDArray[np.float64]
 Windows = Callable[..., list[Window]]
 SDS = (2e-3, 1e-3, 4e-3)
+
+
+def nothing_fitted(samples: int) -> LinearFit:
+    return LinearFit(np.zeros((samples, 0)), np.ones(samples), np.zeros(0))
 
 
 def quick(made: Any, seed: int, shape: str = "exponentials") -> tuple[list[Trial], list[Array]]:
@@ -99,7 +103,7 @@ def test_false_alarms_on_noise_taken_from_curves(made: Any, make: Any) -> None:
             Residual(t.facts.trial, 6.0, t.force_time_s, e, t.facts.phases, t.length_change_l0, np.ones(e.size))
             for t, e in zip(trials, noise, strict=True)
         ]
-        found = significance(residuals, LinearFit.nothing(sum(e.size for e in noise)), noise_of(trials), 60, seed)
+        found = significance(residuals, nothing_fitted(sum(e.size for e in noise)), noise_of(trials), 60, seed)
         assert not found.detected()
         p.append(found.overall_p)
     # 4 and more of 12 at 5 % have a chance of 0.2 %.

@@ -89,8 +89,8 @@ class Judged:
         if not self.without_fibres:
             return None
         # What was only promised is worth no more than its cap, whatever a fibre says.
-        told = self.averages.fitted_alone.log_odds(group) - self.without_fibres[fibre].fitted_alone.log_odds(group)
-        return min(max(told, -MOST_LOG_ODDS), MOST_LOG_ODDS) if math.isfinite(told) else None
+        raised = self.averages.fitted_alone.log_odds(group) - self.without_fibres[fibre].fitted_alone.log_odds(group)
+        return min(max(raised, -MOST_LOG_ODDS), MOST_LOG_ODDS) if math.isfinite(raised) else None
 
     @property
     def chosen(self) -> Names:
@@ -167,12 +167,8 @@ def _of_one(judged: Judged, names: Names, name: Name, i: int) -> tuple[Parameter
     rows = []
     for c in problem.coordinates:
         if c.name in wanted:
-            z, sd = c.inward(fit.values[c.label]), fit.sds[c.label]
-            low, high = (
-                c.outward(max(min(x, c.inward(c.upper)), c.inward(c.lower)))
-                for x in (z - _NORMAL * sd, z + _NORMAL * sd)
-            )
-            rows.append(Parameter(c.label, _unit(c), fit.values[c.label], (low, high), _at_bound(c, z)))
+            value, z = fit.values[c.label], c.inward(fit.values[c.label])
+            rows.append(Parameter(c.label, _unit(c), value, _interval(c, z, fit.sds[c.label]), _at_bound(c, z)))
     return tuple(rows)
 
 
@@ -190,13 +186,17 @@ def _of_all(judged: Judged, names: Names, name: Name) -> tuple[Parameter, ...]:
     coordinates = {c.label: c for c in e.systems[0].problem(names, e.fits[names][0].values).coordinates}
     for label in CATALOGUE[name.value].parameters:
         c, d = coordinates[label], distribution(estimates[label])
-        ends = (d.mean - _NORMAL * d.se, d.mean + _NORMAL * d.se)
-        low, high = (c.outward(max(min(x, c.inward(c.upper)), c.inward(c.lower))) for x in ends)
         # On a logarithmic scale the spread is that around the centre.
         value = c.outward(d.mean)
         spread = value * float(np.expm1(d.spread)) if c.log else d.spread
-        rows.append(Parameter(label, _unit(c), value, (low, high), False, spread))
+        rows.append(Parameter(label, _unit(c), value, _interval(c, d.mean, d.se), False, spread))
     return tuple(rows)
+
+
+def _interval(c: Coordinate, z: float, sd: float) -> tuple[float, float]:
+    """Of a normal posterior, within the coordinate's bounds."""
+    low, high = (c.outward(max(min(z + x * sd, c.inward(c.upper)), c.inward(c.lower))) for x in (-_NORMAL, _NORMAL))
+    return low, high
 
 
 def _unit(c: Coordinate) -> str:

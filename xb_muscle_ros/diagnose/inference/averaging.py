@@ -10,9 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
-from xb_muscle_ros.diagnose.search.descent import TOLD
 from xb_muscle_ros.diagnose.search.explore import Explorer
-from xb_muscle_ros.diagnose.search.system import Names
+from xb_muscle_ros.diagnose.search.system import Names, without
 
 Array = npt.NDArray[np.float64]
 
@@ -78,8 +77,8 @@ class Averaged:
         if not np.any(here) or not np.any(without):
             return 0.0
         best = [int(np.argmax(np.where(chosen, self.log_evidence, -np.inf))) for chosen in (here, without)]
-        left = [float(self.mean_square_f0[k]) for k in best]
-        return math.sqrt(max(left[1] - left[0], 0.0))
+        squares = [float(self.mean_square_f0[k]) for k in best]
+        return math.sqrt(max(squares[1] - squares[0], 0.0))
 
     def rivals(self, name: Name, others: Sequence[Name]) -> list[Name]:
         """Names that take its place in other sets."""
@@ -107,16 +106,15 @@ def averaged(explorer: Explorer, fibres: Sequence[int] | None = None) -> Average
     for names, promised in explorer.promised.items():
         if names in explorer.fits or names in explorer.unsolved:
             continue
-        parents = [tuple(m for m in names if m is not n) for n in names]
+        parents = [without(names, n) for n in names]
         parent = max((p for p in parents if p in explorer.fits), key=explorer.evidence, default=None)
         if parent is None:
             continue
         gained = -_UNFITTED + explorer.odds(names) - explorer.odds(parent)
         for i in chosen:
             system, floor = explorer.systems[i], explorer.floors_f0[i]
-            told = TOLD * float(np.sum(system.weights))
             before = explorer.fits[parent][i].mean_square_f0
-            gained += 0.5 * told * math.log((floor**2 + before) / (floor**2 + min(promised[i], before)))
+            gained += system.log_likelihood(min(promised[i], before), floor) - system.log_likelihood(before, floor)
         # What a line promises and nobody fitted is no evidence beyond that of what was fitted.
         sets.append(names)
         evidence.append(

@@ -44,6 +44,6 @@ def calibrated(log_odds: float, contribution_f0: float, constants: Constants = C
     if math.isinf(log_odds) and log_odds < 0.0:
         return 0.0
     size = min(max(contribution_f0 / PRACTICAL_F0, _LEAST), _LARGEST)
-    told = min(max(log_odds, -MOST_LOG_ODDS), MOST_LOG_ODDS)
-    worth = constants.offset + constants.slope * told + constants.size * math.log(size)
+    counted = min(max(log_odds, -MOST_LOG_ODDS), MOST_LOG_ODDS)
+    worth = constants.offset + constants.slope * counted + constants.size * math.log(size)
     return 1.0 / (1.0 + math.exp(-min(max(worth, -_MOST), _MOST)))

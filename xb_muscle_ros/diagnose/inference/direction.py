@@ -12,7 +12,7 @@ from xb_muscle_ros.diagnose.words import percent, phase_words
 
 Array = npt.NDArray[np.float64]
 
-# Less is not told, F0.
+# Less is not reported, F0.
 _LEAST_F0 = 5e-4
 
 

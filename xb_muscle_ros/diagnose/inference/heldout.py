@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.component import HeldOutGain
 from xb_muscle_ros.diagnose.names import Name
-from xb_muscle_ros.diagnose.search.descent import Fit
-from xb_muscle_ros.diagnose.search.explore import Explorer, fitted
+from xb_muscle_ros.diagnose.search.descent import Fit, fitted
+from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import SATURATING, Names, System
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.calibration import calibrated_force
@@ -75,11 +75,8 @@ def predicted(system: System, fit: Fit, trial: FitTrial, closure_f0: Array | Non
         UserError: the model has no solution.
     """
     problem = system.problem(fit.names, fit.values)
-    size = len(problem.coordinates)
-    correction = None
-    if closure_f0 is not None:
-        correction = Correction.level(np.zeros(size), {trial.name: closure_f0}, np.zeros(len(problem.features)))
-    problem = replace(problem, correction=correction)
+    own = None if closure_f0 is None else Correction.level({trial.name: closure_f0}, np.zeros(len(problem.features)))
+    problem = replace(problem, correction=own)
     return calibrated_force(problem, problem.start, trial).force_f0
 
 

@@ -12,7 +12,6 @@ from xb_muscle_ros.diagnose.search.descent import Descent
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.searching import Searched
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.fit.correction import Correction
 
 
 def left_out(study: Searched, chosen: Names) -> list[tuple[float, float] | None]:
@@ -40,30 +39,20 @@ def left_out(study: Searched, chosen: Names) -> list[tuple[float, float] | None]
         made = system.problem(names, values)
         free = [j for j, c in enumerate(made.coordinates) if c.label not in common]
         fixed = replace(made.fibre, values={**made.fibre.values, **common})
-        size = len(free)
-        correction = made.correction and Correction.level(
-            np.zeros(size), made.correction.force, made.correction.features
-        )
-        held = replace(made, fibre=fixed, coordinates=tuple(made.coordinates[j] for j in free), correction=correction)
+        held = replace(made, fibre=fixed, coordinates=tuple(made.coordinates[j] for j in free))
         try:
             descent = Descent(system, held)
             point, _ = descent.walk(held.start, explorer.effort.most, explorer.effort.tolerance)
         except (UserError, np.linalg.LinAlgError):
             rows.append(None)
             continue
-        full = recorded.problem(names, values)
-        again = replace(
-            held,
-            trials=recorded.trials,
-            correction=full.correction
-            and Correction.level(np.zeros(size), full.correction.force, full.correction.features),
-        )
+        every = replace(held, trials=recorded.trials, correction=recorded.problem(names, values).correction)
         try:
-            forces = again.predicted(point.z)
+            forces = every.predicted(point.z)
         except UserError:
             rows.append(None)
             continue
-        left = np.concatenate([f - t.measured_f0 for f, t in zip(forces, recorded.trials, strict=True)])
+        residual = np.concatenate([f - t.measured_f0 for f, t in zip(forces, recorded.trials, strict=True)])
         base = study.around((), i).residual_f0
-        rows.append((float(np.sqrt(np.mean(base**2))), float(np.sqrt(np.mean(left**2)))))
+        rows.append((float(np.sqrt(np.mean(base**2))), float(np.sqrt(np.mean(residual**2)))))
     return rows

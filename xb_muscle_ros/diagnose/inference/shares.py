@@ -20,7 +20,7 @@ def explained(explorer: Explorer, names: Names, noise_f0: Sequence[float], fibre
 def unique(
     explorer: Explorer, names: Names, without: Names, noise_f0: Sequence[float], fibre: int | None = None
 ) -> float:
-    """Share of the base's mismatch that comes back where a part of a set is left out and all else is fitted anew."""
+    """Ablation loss of a part of a set, all else fitted anew, as a share of the base's mismatch."""
     chosen = range(len(explorer.systems)) if fibre is None else [fibre]
     before = _excess(explorer, (), noise_f0, chosen)
     if before <= 0.0 or without not in explorer.fits:

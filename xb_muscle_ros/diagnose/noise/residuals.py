@@ -1,4 +1,4 @@
-"""What a fit left of every trial, beside the noise of its recording."""
+"""Residuals of a fit in every trial, beside the noise of its recording."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.noise.cells import Residual
-from xb_muscle_ros.diagnose.noise.flexible import flexible_fit
-from xb_muscle_ros.diagnose.noise.kernel import Law, law
-from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
+from xb_muscle_ros.diagnose.noise.discrepancy import discrepancy
+from xb_muscle_ros.diagnose.noise.law import Law, law
 from xb_muscle_ros.diagnose.noise.significance import Significance, significance
 from xb_muscle_ros.diagnose.search.descent import Fit
 from xb_muscle_ros.diagnose.search.system import System
 from xb_muscle_ros.errors import naming
+from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.scores.noise.model import NoiseModel
+from xb_muscle_ros.simulation.offline import outputs
 from xb_muscle_ros.trials.trial import Trial
 
 Array = npt.NDArray[np.float64]
@@ -40,13 +41,13 @@ class Around:
     fit: LinearFit
 
     @staticmethod
-    def of(recorded: System, fit: Fit, told: float) -> Around:
+    def of(recorded: System, fit: Fit, effective_samples: float) -> Around:
         """A fit of thinned trials, at all samples.
 
         Args:
             recorded: the system with all samples.
             fit: to the thinned ones.
-            told: how many independent residuals it had.
+            effective_samples: how many independent residuals it had.
         """
         problem = recorded.problem(fit.names, fit.values)
         training = Training(problem)
@@ -54,12 +55,10 @@ class Around:
         lower, upper = problem.bounds
         margin = 1e-6 * np.maximum(1.0, np.abs(upper - lower))
         free = (problem.start > lower + margin) & (problem.start < upper - margin)
-        sds = np.array([c.prior_sd for c in problem.coordinates])
-        prior = np.where(np.isfinite(sds), sds**-2.0, 0.0)
         residual = training.measured - training.force(problem.start)
         scale = max(float(np.sqrt(np.mean(residual**2))), recorded.noise_f0)
-        weights = np.full(residual.size, np.sqrt(told / residual.size) / scale)
-        return Around(problem, residual, LinearFit(np.nan_to_num(slopes[:, free]), weights, prior[free]))
+        weights = np.full(residual.size, np.sqrt(effective_samples / residual.size) / scale)
+        return Around(problem, residual, LinearFit(np.nan_to_num(slopes[:, free]), weights, problem.information[free]))
 
     def by_trial(self) -> list[Array]:
         """The residual of each trial."""
@@ -84,7 +83,7 @@ class Recordings:
     seed: int
 
     def residuals(self, around: Around) -> list[Residual]:
-        """What a fit left of every trial."""
+        """Residual of every trial."""
         found = []
         for trial, fitted, value in zip(self.trials, around.problem.trials, around.by_trial(), strict=True):
             times = fitted.force_time_s
@@ -102,7 +101,7 @@ class Recordings:
         return found
 
     def significance(self, around: Around) -> Significance:
-        """Of what a fit left."""
+        """Of a fit's residual."""
         return significance(self.residuals(around), around.fit, self.noise, self.draws, self.seed)
 
     def usual_noise_f0(self) -> float:
@@ -110,7 +109,7 @@ class Recordings:
         return float(np.median([noise.sd_f0 for noise in self.noise.trials]))
 
     def law(self, around: Around) -> Law | None:
-        """The law of what a fit left."""
+        """The law of a fit's residual."""
         return law(self.residuals(around), around.fit, _scalings(around.problem))
 
     def benchmark(self, around: Around, folds: Sequence[Collection[str]]) -> tuple[float, float, int] | None:
@@ -128,14 +127,14 @@ class Recordings:
                 return None
             weights = around.fit.weights * np.repeat([0.0 if h else 1.0 for h in held], [r.time_s.size for r in found])
             without = LinearFit(around.fit.slopes, weights, around.fit.prior)
-            value = without.left(around.residual_f0[:, None])[:, 0]
+            value = without.residual(around.residual_f0[:, None])[:, 0]
             edges = np.cumsum([0, *(r.time_s.size for r in found)])
             here = [r._replace(value_f0=value[a:b]) for r, a, b in zip(found, edges[:-1], edges[1:], strict=True)]
-            predicted = flexible_fit(here, held, without, scalings).predicted_f0
-            left = [r.value_f0 for r, h in zip(here, held, strict=True) if h]
-            plain += sum(float(np.sum(v**2)) for v in left)
-            learnt += sum(float(np.sum((v - p) ** 2)) for v, p in zip(left, predicted, strict=True))
-            samples += sum(v.size for v in left)
+            predicted = discrepancy(here, held, without, scalings).predicted_f0
+            held_out = [r.value_f0 for r, h in zip(here, held, strict=True) if h]
+            plain += sum(float(np.sum(v**2)) for v in held_out)
+            learnt += sum(float(np.sum((v - p) ** 2)) for v, p in zip(held_out, predicted, strict=True))
+            samples += sum(v.size for v in held_out)
         return plain, learnt, samples
 
 
@@ -145,8 +144,7 @@ def _scalings(problem: Problem) -> Mapping[str, list[Array]]:
     activation, calcium, force = [], [], []
     for trial in problem.trials:
         with naming(f"trial {trial.name}"):
-            state = muscle.settle(float(trial.length_l0[0]), float(trial.calcium_um[0]))
-            out = muscle.outputs_of(muscle.run(state, trial.dt_s, trial.length_l0, trial.calcium_um))
+            out = outputs(muscle, trial.dt_s, trial.length_l0, trial.calcium_um)
         activation.append(np.interp(trial.force_time_s, trial.time_s, out["n_on"]))
         force.append(np.interp(trial.force_time_s, trial.time_s, out["force_ce_f0"]))
         given = np.interp(trial.force_time_s, trial.time_s, trial.calcium_um)

@@ -1,10 +1,10 @@
 """Whether, where and when recording and fitted model differ by more than noise: a bootstrap that refits.
 
 Samples of a residual resemble each other over tens of milliseconds, and a fit takes out of noise what its coordinates
-can follow. So the null is made of noise of the recordings' own size and colour, drawn with what is not known of them,
-put through the fit's normal equations together with what its priors cost, and looked at in the same cells. The largest
-over all cells counts (step-down maxima: Westfall and Young, Resampling-Based Multiple Testing (1993)), so that the
-chance of any false cell is what a p-value says.
+can follow. So the null is made of noise of the recordings' own scale and autocorrelation, drawn with what is not known
+of them, put through the fit's normal equations together with what its priors cost, and looked at in the same cells. The
+largest over all cells counts (step-down maxima: Westfall and Young, Resampling-Based Multiple Testing (1993)), so that
+the chance of any false cell is what a p-value says.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.noise.cells import Cell, Residual, cut, exceeding, mean, phase_names, rms
-from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.scores.noise.model import NoiseModel
 
 Array = npt.NDArray[np.float64]
@@ -86,18 +86,27 @@ class Significance:
             here = slice(cell.begin, cell.end)
             start_s, end_s = exceeding(times[here], values[here], float(self.floor_f0[i]))
             phase, size = self._phase(cell)
-            row = {
-                "trial": cell.trial,
-                "phase": phase,
-                "start_s": start_s,
-                "end_s": end_s,
-                "size_f0": float(self.rms_f0[i]),
-                "mean_f0": float(self.mean_f0[i]),
-                "sign": 1 if self.mean_f0[i] >= 0.0 else -1,
-                "p_value": float(self.p_value[i]),
-            }
-            rows.append((size, float(self.rms_f0[i]), row))
+            row = self._row(int(i), phase, start_s, end_s)
+            rows.append((size, row["size_f0"], row))
         return [row for _, _, row in sorted(rows, key=lambda r: r[:2], reverse=True)]
+
+    def largest(self) -> dict[str, Any]:
+        """The cell with the largest residual as a row of plain data, whether it counts or not."""
+        i = int(np.argmax(self.rms_f0))
+        cell = self.cells[i]
+        return self._row(i, cell.phase, cell.start_s, cell.end_s)
+
+    def _row(self, i: int, phase: str, start_s: float, end_s: float) -> dict[str, Any]:
+        return {
+            "trial": self.cells[i].trial,
+            "phase": phase,
+            "start_s": start_s,
+            "end_s": end_s,
+            "size_f0": float(self.rms_f0[i]),
+            "mean_f0": float(self.mean_f0[i]),
+            "sign": 1 if self.mean_f0[i] >= 0.0 else -1,
+            "p_value": float(self.p_value[i]),
+        }
 
     def _phase(self, cell: Cell) -> tuple[str, float]:
         """Name of the phase that a cell is part of, and the residual's root mean square over all of it, F0."""
@@ -134,7 +143,7 @@ def significance(
     seed: int = 1,
     floor_f0: float = FLOOR_F0,
 ) -> Significance:
-    """Compare what a fit left with what it would have left of noise.
+    """Compare a fit's residual with what it would be if there were only noise.
 
     Args:
         residuals: of all trials, after the fit.
@@ -150,7 +159,7 @@ def significance(
     cells = cut(residuals)
     values = np.concatenate([r.value_f0 for r in residuals])[:, None]
     sharp = sharpened(residuals, fit, noise)
-    # What the fit would have left, had it known that there is only noise.
+    # The residual of a fit that knows that there is only noise.
     gained = sharp.slopes.T @ ((sharp.weights**2 - fit.weights**2)[:, None] * values)
     tested = values - sharp.slopes @ sharp.solved(gained)
     null, whole = [], []
@@ -197,7 +206,7 @@ def null_residuals(
     chosen = noise.of([r.trial for r in residuals])
     random = np.random.default_rng(seed)
     for part in np.array_split(np.arange(draws), math.ceil(draws * samples / _AT_ONCE)):
-        yield fit.left(chosen.draw(times_s, part.size, random)) + fit.pulled(part.size, random)
+        yield fit.residual(chosen.draw(times_s, part.size, random)) + fit.prior_residual(part.size, random)
 
 
 def sharpened(residuals: Sequence[Residual], fit: LinearFit, noise: NoiseModel) -> LinearFit:
@@ -211,7 +220,7 @@ def sharpened(residuals: Sequence[Residual], fit: LinearFit, noise: NoiseModel) 
     _check_samples(residuals, fit)
     variances = []
     for r, of_trial in zip(residuals, noise.of([r.trial for r in residuals]).trials, strict=True):
-        # As if that many samples told as much as one independent one.
+        # Integrated autocorrelation time: so many samples are worth one independent one.
         counted = of_trial.likeliest.variance_of_mean(r.time_s)
         variances.append(np.full(r.time_s.size, max(counted, of_trial.sd_f0**2)))
     weighted = fit.weights**2 * np.concatenate(variances)

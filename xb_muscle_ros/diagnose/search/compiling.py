@@ -15,6 +15,7 @@ from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.models.compiled import is_compiled
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.simulation.offline import outputs
 from xb_muscle_ros.work import Options, run
 
 # A fibre is half active at about this calcium, µM; which it is does not matter.
@@ -27,9 +28,8 @@ def compile_task(task: Mapping[str, Any]) -> bool:
     All that trials need is compiled, not single steps alone: the fibre settles and takes one short step as fits do.
     """
     try:
-        muscle = Muscle(Problem.from_json(task["problem"]).fibre)
-        state = muscle.settle(0.0, _CALCIUM_UM)
-        muscle.outputs_of(muscle.run(state, np.full(1, 1e-4), np.zeros(2), np.full(2, _CALCIUM_UM)))
+        fibre = Problem.from_json(task["problem"]).fibre
+        outputs(Muscle(fibre), np.full(1, 1e-4), np.zeros(2), np.full(2, _CALCIUM_UM))
     except UserError:
         return False
     return True

@@ -8,7 +8,7 @@ the residuals have there, which can only lower that cost (the logarithm lies bel
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,8 +25,6 @@ Array = npt.NDArray[np.float64]
 
 # Longest move of a step: of a logarithm, and of others in units of their prior's standard deviation.
 _LONGEST_LOG, _LONGEST_SD = 1.0, 3.0
-# Independent residuals resemble each other still: a misfit lasts as long as its phase.
-TOLD = 0.6
 _REJECTED = 6
 
 
@@ -60,29 +58,16 @@ class Fit:
 
     def cost(self, system: System, floor_f0: float | None = None) -> float:
         """See the module; the floor is the system's noise unless another is given, F0."""
-        floor = system.noise_f0 if floor_f0 is None else floor_f0
-        told = TOLD * float(np.sum(system.weights))
-        return 0.5 * told * float(np.log(floor**2 + self.mean_square_f0)) + self.prior
+        return self.prior - system.log_likelihood(self.mean_square_f0, floor_f0)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return {
-            "names": [n.value for n in self.names],
-            "values": dict(self.values),
-            "mean_square_f0": self.mean_square_f0,
-            "prior": self.prior,
-            "occam": self.occam,
-            "sds": dict(self.sds),
-            "simulated": self.simulated,
-        }
+        return {**self.__dict__, "names": [n.value for n in self.names]}
 
     @staticmethod
     def from_json(row: Mapping[str, Any]) -> Fit:
         """From plain data."""
-        names = ordered([Name(n) for n in row["names"]])
-        return Fit(
-            names, row["values"], row["mean_square_f0"], row["prior"], row["occam"], row["sds"], row["simulated"]
-        )
+        return Fit(**{**row, "names": ordered([Name(n) for n in row["names"]])})
 
 
 @dataclass
@@ -103,7 +88,7 @@ class Point:
     feature: Array
 
     @property
-    def pulled(self) -> float:
+    def penalty(self) -> float:
         """Half the squared distances."""
         return 0.5 * float(self.prior @ self.prior + self.feature @ self.feature)
 
@@ -119,10 +104,9 @@ class Descent:
         self.system, self.problem = system, problem
         self.training = Training(problem)
         self.total = float(np.sum(system.weights))
-        self.told = TOLD * self.total
         self.lower, self.upper = problem.bounds
         sds = np.array([c.prior_sd for c in problem.coordinates])
-        self.information = np.where(np.isfinite(sds), sds**-2.0, 0.0)
+        self.information = problem.information
         logs = np.array([c.log for c in problem.coordinates], dtype=bool)
         self.longest = np.where(logs, _LONGEST_LOG, np.where(np.isfinite(sds), _LONGEST_SD * sds, np.inf))
         self.simulated = 0.0
@@ -145,8 +129,13 @@ class Descent:
 
     def cost(self, point: Point) -> float:
         """See the module."""
-        floor = self.system.noise_f0
-        return 0.5 * self.told * float(np.log(floor**2 + point.mean_square)) + point.pulled
+        return point.penalty - self.system.log_likelihood(point.mean_square)
+
+    def sample_weights(self, point: Point) -> Array:
+        """Information of each sample at the scale that the residuals of a point have, shape (samples,), 1/F0²."""
+        scale = self.system.effective_samples / self.total / (self.system.noise_f0**2 + point.mean_square)
+        out: Array = scale * self.system.weights
+        return out
 
     def slopes(self, point: Point) -> Array:
         """Of the recorded force by the coordinates, shape (samples, coordinates), F0."""
@@ -157,8 +146,7 @@ class Descent:
 
     def normal(self, point: Point, slopes: Array) -> tuple[Array, Array]:
         """Curvature and gradient of the cost at the scale that the residuals have."""
-        scale = self.told / self.total / (self.system.noise_f0**2 + point.mean_square)
-        weighted = slopes * (scale * self.system.weights)[:, None]
+        weighted = slopes * self.sample_weights(point)[:, None]
         curvature = weighted.T @ slopes + np.diag(self.information) + self.of_features.T @ self.of_features
         means = np.array([c.prior_mean for c in self.problem.coordinates])
         gradient = weighted.T @ point.residual + self.information * (point.z - means)
@@ -205,11 +193,16 @@ class Descent:
             else:
                 return point, updated
 
+    def free(self, point: Point, gradient: Array) -> npt.NDArray[np.bool_]:
+        """Coordinates that no bound stops, shape (coordinates,)."""
+        stopped = ((point.z <= self.lower) & (gradient > 0.0)) | ((point.z >= self.upper) & (gradient < 0.0))
+        out: npt.NDArray[np.bool_] = ~stopped
+        return out
+
     def _step(self, point: Point, jacobian: Array, cost: float, damping: float) -> tuple[Point, float, float] | None:
         """The next point, its cost and the damping to go on with; None where nothing is lower."""
         curvature, gradient = self.normal(point, jacobian)
-        stuck = ((point.z <= self.lower) & (gradient > 0.0)) | ((point.z >= self.upper) & (gradient < 0.0))
-        free = ~stuck
+        free = self.free(point, gradient)
         if not np.any(free):
             return None
         within = np.ix_(free, free)
@@ -244,5 +237,43 @@ class Descent:
         sds = np.minimum(sds, priors)
         by_label = {c.label: float(sd) for c, sd in zip(self.problem.coordinates, sds, strict=True)}
         return Fit(
-            ordered(names), values, point.mean_square, point.pulled, 0.5 * float(twice), by_label, round(self.simulated)
+            ordered(names),
+            values,
+            point.mean_square,
+            point.penalty,
+            0.5 * float(twice),
+            by_label,
+            round(self.simulated),
         )
+
+
+def fit_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Fit a set from the best of several starts; None where the model has no solution at any."""
+    system = System.from_json(task["system"])
+    found = fitted(system, [Name(n) for n in task["names"]], task["starts"], task["most"], task["tolerance"])
+    return None if found is None else found.to_json()
+
+
+def fitted(
+    system: System, names: Collection[Name], starts: Sequence[Mapping[str, float]], most: int, tolerance: float
+) -> Fit | None:
+    """Fit a set from the best of several starts; None where the model has no solution at any."""
+    begun: list[tuple[float, Descent, Array, Array | None]] = []
+    for start in starts:
+        try:
+            problem = system.problem(names, start)
+            descent = Descent(system, problem)
+            if len(starts) == 1:
+                begun.append((0.0, descent, problem.start, None))
+                continue
+            point, near = descent.walk(problem.start, 2, tolerance)
+            begun.append((descent.cost(point), descent, point.z, near))
+        except (UserError, np.linalg.LinAlgError):
+            continue
+    for _, descent, z, _near in sorted(begun, key=lambda b: b[0]):
+        try:
+            point, slopes = descent.walk(z, most, tolerance)
+            return descent.fit(ordered(names), point, slopes)
+        except (UserError, np.linalg.LinAlgError):
+            continue
+    return None

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.inference.population import Estimate, adjustment
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
-from xb_muscle_ros.diagnose.search.descent import Descent, Fit
+from xb_muscle_ros.diagnose.search.descent import Fit, fit_task
 from xb_muscle_ros.diagnose.search.promise import Linear, Promise, promise
-from xb_muscle_ros.diagnose.search.starts import spread, starts_of
-from xb_muscle_ros.diagnose.search.system import Names, System, label, ordered
+from xb_muscle_ros.diagnose.search.system import Names, System, label, ordered, without
 from xb_muscle_ros.diagnose.search.whole import beside
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.catalogue import CATALOGUE
@@ -30,7 +28,7 @@ _WORTH = 0.5
 _PATIENCE = 3.0
 # Form errors of mechanisms: share of what a mechanism does that its form here gets wrong.
 FORM = 0.12
-# Of a set whose curvature cannot be told.
+# Of a set whose curvature is not known.
 _NONE = -1e9
 
 
@@ -56,36 +54,15 @@ class Effort:
 QUICK = Effort(steps=5, candidates=4, rivals=2, most=5, tolerance=0.1)
 
 
-def fit_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Fit a set from the best of several starts; None where the model has no solution at any."""
-    system = System.from_json(task["system"])
-    found = fitted(system, [Name(n) for n in task["names"]], task["starts"], task["most"], task["tolerance"])
-    return None if found is None else found.to_json()
-
-
-def fitted(
-    system: System, names: Collection[Name], starts: Sequence[Mapping[str, float]], most: int, tolerance: float
-) -> Fit | None:
-    """Fit a set from the best of several starts; None where the model has no solution at any."""
-    begun: list[tuple[float, Descent, Array, Array | None]] = []
-    for start in starts:
-        try:
-            problem = system.problem(names, start)
-            descent = Descent(system, problem)
-            if len(starts) == 1:
-                begun.append((0.0, descent, problem.start, None))
-                continue
-            point, near = descent.walk(problem.start, 2, tolerance)
-            begun.append((descent.cost(point), descent, point.z, near))
-        except (UserError, np.linalg.LinAlgError):
-            continue
-    for _, descent, z, _near in sorted(begun, key=lambda b: b[0]):
-        try:
-            point, slopes = descent.walk(z, most, tolerance)
-            return descent.fit(ordered(names), point, slopes)
-        except (UserError, np.linalg.LinAlgError):
-            continue
-    return None
+def spread(system: System) -> list[dict[str, float]]:
+    """Further points to start the base from: more and less cooperativity, faster and slower heads."""
+    values = system.fibre.values
+    found: list[dict[str, float]] = []
+    for factors in ({"koop": 3.0, "kon": 0.6}, {"koop": 0.4, "kon": 1.4}, {"f": 0.7, "k11": 0.5}):
+        start = {name: values[name] * factor for name, factor in factors.items() if values.get(name, 0.0) > 0.0}
+        if start and start not in found:
+            found.append(start)
+    return found
 
 
 class Explorer:
@@ -111,6 +88,7 @@ class Explorer:
     ) -> list[Names]:
         """Fit sets, each with starts for every fibre; those that have a solution in all of them."""
         missing = [(ordered(names), starts) for names, starts in wanted if ordered(names) not in self.fits]
+        plains = [s.to_json() for s in self.systems] if missing else []
         tasks = [
             {
                 "system": plain,
@@ -120,7 +98,7 @@ class Explorer:
                 "tolerance": self.effort.tolerance,
             }
             for names, starts in missing
-            for plain, of_fibre in zip(self._plain(), starts, strict=True)
+            for plain, of_fibre in zip(plains, starts, strict=True)
         ]
         rows = run(fit_task, tasks, replace(self.options, label=why)) if tasks else []
         count = len(self.systems)
@@ -132,9 +110,6 @@ class Explorer:
                 self.fits[names] = tuple(Fit.from_json(row) for row in own)
         return [ordered(names) for names, _ in wanted if ordered(names) in self.fits]
 
-    def _plain(self) -> list[dict[str, Any]]:
-        return [s.to_json() for s in self.systems]
-
     def linear(self, names: Names) -> list[Linear]:
         """Fits of a set, taken as linear."""
         if names not in self._linear:
@@ -145,7 +120,7 @@ class Explorer:
         """Logarithm of a set's probability but for a constant, by all fibres together or by some."""
         chosen = range(len(self.systems)) if fibres is None else fibres
         fits = self.fits[names]
-        own = [self._cost(self.systems[i], fits[i], self.floors_f0[i]) for i in chosen]
+        own = [fits[i].cost(self.systems[i], self.floors_f0[i]) + fits[i].occam for i in chosen]
         found = self.odds(names) + self.adjusted(names, chosen) - float(sum(own))
         return found if np.isfinite(found) else _NONE
 
@@ -179,10 +154,6 @@ class Explorer:
     def odds(names: Names) -> float:
         """Logarithm of the chance of a set before anything is seen."""
         return float(sum(_PRIOR_ODDS[n not in MEASUREMENT] for n in names))
-
-    @staticmethod
-    def _cost(system: System, fit: Fit, floor_f0: float) -> float:
-        return fit.cost(system, floor_f0) + fit.occam
 
     def best(self) -> Names:
         """The set with the most evidence."""
@@ -218,20 +189,21 @@ class Explorer:
         """Fit the most promising candidates beside a set."""
         promises = self.promises(names)
         gains = {n: float(sum(p.gain for p in ps)) for n, ps in promises.items()}
-        told = sorted((n for n in gains if not np.isnan(gains[n])), key=lambda n: -gains[n])
+        ranked = sorted((n for n in gains if not np.isnan(gains[n])), key=lambda n: -gains[n])
         # An odd name more costs its odds; what promises less than that is not fitted.
-        chosen = [n for n in told if gains[n] > 1.0][:count]
+        chosen = [n for n in ranked if gains[n] > 1.0][:count]
         chosen += [n for n in gains if np.isnan(gains[n]) and blind]
         wanted = [((*names, n), self.starts(promises[n])) for n in chosen]
         return self.fit(wanted, f"{label(names)} and one more")
 
     def starts(self, promised: Sequence[Promise]) -> list[list[Mapping[str, float]]]:
         """Where the fit of a candidate starts in every fibre."""
-        found: list[list[Mapping[str, float]]] = [[*p.starts] for p in promised]
-        if np.isnan(promised[0].gain):
-            own = starts_of(self.systems, promised[0].name)
-            return [[*s, *o] for s, o in zip(found, own, strict=True)]
-        return found
+        if not np.isnan(promised[0].gain):
+            return [[*p.starts] for p in promised]
+        catalogue = CATALOGUE[promised[0].name.value]
+        return [
+            [*p.starts, *catalogue.starting_values(s.fibre.values)] for p, s in zip(promised, self.systems, strict=True)
+        ]
 
     def base(self) -> None:
         """Fit the base, from several starts.
@@ -250,7 +222,7 @@ class Explorer:
 
     def anew(self, systems: Sequence[System]) -> None:
         """Other systems; fits start where those of the former ones ended."""
-        starts = [[f.values] for f in self.fits[()]]
+        starts = self.ends(())
         self.systems = list(systems)
         for kept in (self.fits, self.promised, self.unsolved, self._estimates, self._adjusted, self._linear):
             kept.clear()
@@ -287,22 +259,23 @@ class Explorer:
         """Without what has become superfluous."""
         if len(names) < 2:
             return names
-        shorter = self._shorter(names)
+        shorter = self.shorter(names)
         best = max(shorter, key=self.evidence, default=names)
         return self._pruned(best) if self.evidence(best) > self.evidence(names) else names
 
-    def _shorter(self, names: Names) -> list[Names]:
-        wanted = []
-        for n in names:
-            rest = tuple(m for m in names if m is not n)
-            wanted.append((rest, [[f.values] for f in self.fits[names]]))
-        return self.fit(wanted, f"{label(names)} but one")
+    def ends(self, names: Names) -> list[list[Mapping[str, float]]]:
+        """Where the fits of a set ended, as starts for every fibre."""
+        return [[f.values] for f in self.fits[names]]
+
+    def shorter(self, names: Names, why: str = "") -> list[Names]:
+        """Fit a set without each of its names in turn."""
+        return self.fit([(without(names, n), self.ends(names)) for n in names], why or f"{label(names)} but one")
 
     def _around(self, names: Names) -> None:
         """Fit what is beside a set: without each name, with another in its place, with one more."""
-        self._shorter(names)
+        self.shorter(names)
         for n in names:
-            rest = tuple(m for m in names if m is not n)
+            rest = without(names, n)
             if rest in self.fits:
                 self.step(rest, self.effort.rivals, blind=len(names) <= 1)
         self.step(names, self.effort.rivals, blind=False)

@@ -12,6 +12,7 @@ from xb_muscle_ros.diagnose.search.descent import Descent, Fit
 from xb_muscle_ros.diagnose.search.system import BEYOND, System
 from xb_muscle_ros.diagnose.search.whole import FRAMES
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.measurement.artefacts import ORDINARY
 from xb_muscle_ros.models.catalogue import CATALOGUE
@@ -29,7 +30,7 @@ class Promise(NamedTuple):
 
     Attributes:
         name: of it.
-        gain: fall of the cost along its line, all else giving way; nan where only a fit can tell.
+        gain: fall of the cost along its line, profiled over all else; nan where only a fit can tell.
         starts: values by label from which its fit may start.
         mean_square_f0: of the residuals there, F0²; nan where only a fit can tell.
     """
@@ -50,12 +51,8 @@ class Linear:
         self.point = self.descent.at(problem.start)
         self.slopes = self.descent.slopes(self.point)
         self.force = self.point.residual + self.descent.training.measured
-        curvature, gradient = self.descent.normal(self.point, self.slopes)
-        lower, upper = self.descent.lower, self.descent.upper
-        z = self.point.z
-        stuck = ((z <= lower) & (gradient > 0.0)) | ((z >= upper) & (gradient < 0.0))
-        self.free = ~stuck
-        self._curvature, self._gradient = curvature, gradient
+        _, gradient = self.descent.normal(self.point, self.slopes)
+        self.free = self.descent.free(self.point, gradient)
 
     def solve(
         self, columns: Array, information: Array, gradient: Array, own: Array | None = None
@@ -71,31 +68,24 @@ class Linear:
         Returns:
             moves of the fit's coordinates and of the further ones, fall of the cost, mean square afterwards.
         """
-        system, d = self.system, self.descent
-        scale = d.told / d.total / (system.noise_f0**2 + self.point.mean_square)
-        weights = scale * system.weights
+        system, d, point = self.system, self.descent, self.point
         free = self.free if own is None else np.ones_like(self.free)
-        mine = self.slopes[:, free]
-        joint = np.hstack([mine, columns])
-        prior = np.concatenate([(d.information if own is None else own)[free], information])
-        distance = self.point.z - np.array([c.prior_mean for c in d.problem.coordinates])
-        pull = np.concatenate([((d.information if own is None else own) * distance)[free], gradient])
-        curvature = (joint * weights[:, None]).T @ joint + np.diag(prior)
-        of_features = d.of_features[:, free]
-        own_size = of_features.shape[1]
-        curvature[:own_size, :own_size] += of_features.T @ of_features
-        pull[:own_size] += of_features.T @ self.point.feature
-        lead = np.sqrt(np.maximum(np.diag(curvature), 1e-300))
-        right = -((joint * weights[:, None]).T @ self.point.residual + pull)
-        move = np.linalg.solve(curvature / lead / lead[:, None] + 1e-9 * np.eye(lead.size), right / lead) / lead
-        residual = self.point.residual + joint @ move
-        mean_square = float(system.weights @ residual**2) / d.total
-        before = 0.5 * d.told * np.log(system.noise_f0**2 + self.point.mean_square)
-        after = 0.5 * d.told * np.log(system.noise_f0**2 + mean_square)
-        priors = 0.5 * float(prior @ move**2) + float(pull @ move)
-        moves = np.zeros(self.point.z.size)
-        moves[free] = move[: mine.shape[1]]
-        return moves, move[mine.shape[1] :], float(before - after) - priors, mean_square
+        of_own = d.information if own is None else own
+        count = int(np.count_nonzero(free))
+        prior = np.concatenate([of_own[free], information])
+        distance = point.z - np.array([c.prior_mean for c in d.problem.coordinates])
+        pull = np.concatenate([(of_own * distance)[free], gradient])
+        of_features: Array = np.pad(d.of_features[:, free], ((0, 0), (0, information.size)))
+        pull += of_features.T @ point.feature
+        joint = np.hstack([self.slopes[:, free], columns])
+        certain = np.diag(prior) + of_features.T @ of_features
+        fit = LinearFit(joint, np.sqrt(d.sample_weights(point)), certain)
+        move = fit.solved(-(fit.score.T @ point.residual + pull))
+        mean_square = float(system.weights @ (point.residual + joint @ move) ** 2) / d.total
+        gain = system.log_likelihood(mean_square) - system.log_likelihood(point.mean_square)
+        moves = np.zeros(point.z.size)
+        moves[free] = move[:count]
+        return moves, move[count:], gain - 0.5 * float(prior @ move**2) - float(pull @ move), mean_square
 
     def values(self, moves: Array) -> dict[str, float]:
         """Values of the fit's coordinates after some moves, within their bounds."""

@@ -26,6 +26,8 @@ Names = tuple[Name, ...]
 
 SATURATING = f"pCa {F0_ANCHOR.pca:g}"
 """Solution whose isometric force is F0."""
+# Residuals that count as independent resemble each other still: a misfit lasts as long as its phase.
+INDEPENDENT = 0.6
 BEYOND = 6.0
 """An artefact that is named may be so much larger than an ordinary one."""
 
@@ -33,6 +35,11 @@ BEYOND = 6.0
 def ordered(names: Collection[Name]) -> Names:
     """Names of a set in their usual order, each once."""
     return tuple(name for name in Name if name in set(names))
+
+
+def without(names: Names, name: Name) -> Names:
+    """The other names of a set."""
+    return tuple(n for n in names if n is not name)
 
 
 def label(names: Collection[Name]) -> str:
@@ -68,6 +75,21 @@ class System:
         parts = [thinned(trial) for trial in trials]
         weights = np.concatenate([part.weights for part in parts])
         return System(fibre, tuple(part.trial for part in parts), weights, noise_f0)
+
+    @property
+    def effective_samples(self) -> float:
+        """Effective sample size: how many independent residuals there are."""
+        return INDEPENDENT * float(np.sum(self.weights))
+
+    def log_likelihood(self, mean_square_f0: float, floor_f0: float | None = None) -> float:
+        """Of residuals of a mean square (F0²), their scale profiled out, but for a constant.
+
+        Args:
+            mean_square_f0: weighted.
+            floor_f0: standard deviation that they have at least, F0; None for the noise.
+        """
+        floor = self.noise_f0 if floor_f0 is None else floor_f0
+        return -0.5 * self.effective_samples * float(np.log(floor**2 + mean_square_f0))
 
     @property
     def measured(self) -> Array:
@@ -110,15 +132,7 @@ class System:
         fibre = replace(fibre, values=present)
         coordinates += self._artefacts(names)
         merged = tuple(_started(c, values, present) for c in {c.label: c for c in coordinates}.values())
-        correction = None
-        if self.closure_f0:
-            correction = Correction(
-                np.zeros(len(merged)),
-                self.closure_f0,
-                {},
-                np.zeros(len(self.features)),
-                np.zeros((len(self.features), len(merged))),
-            )
+        correction = Correction.level(self.closure_f0, np.zeros(len(self.features))) if self.closure_f0 else None
         return Problem(fibre, self.trials, merged, {}, self.features, correction)
 
     def error_sd(self, name: str) -> float:

@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 _SHORTEST_S, _GROWTH = 0.001, 0.12
 # What may be straightened, L0 and relative: 0.1 % F0 of a stiff fibre.
 _LENGTH_L0, _CALCIUM = 2e-5, 1e-3
-MEMORY_S, _SLOWING = 0.03, 0.5
+INDEPENDENT_S, _SLOWING = 0.03, 0.5
 """Residuals so far apart are as good as independent right after a corner; later by a share of the time since more."""
 
 
@@ -50,7 +50,7 @@ def thinned(trial: FitTrial) -> Thinned:
     force = np.add.reduceat(trial.measured_f0, starts) / counts
     step_s = (last - first) / max(trial.force_time_s.size - 1, 1)
     since_s = time_s - corners_s[np.clip(np.searchsorted(corners_s, time_s, side="right") - 1, 0, corners_s.size - 1)]
-    weights = np.minimum(counts * step_s / (MEMORY_S + _SLOWING * np.maximum(since_s, 0.0)), 1.0)
+    weights = np.minimum(counts * step_s / (INDEPENDENT_S + _SLOWING * np.maximum(since_s, 0.0)), 1.0)
     made = replace(
         trial,
         time_s=edges,

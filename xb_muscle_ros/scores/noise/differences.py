@@ -1,7 +1,7 @@
 """Noise of trials in which nothing runs smoothly for long enough: what neighbouring samples do not tell of each other.
 
 Each sample is predicted by the cubic through its four neighbours (Gasser, Sroka and Jennen-Steinmetz, Biometrika 73
-(1986) 625-633, with two). Half of the samples lie where force bends little, so the median of what is left is the
+(1986) 625-633, with two). Half of the samples lie where force bends little, so the median of the residual is the
 noise's. It shows only what is fast: how much slower noise there is beside it is taken from measured fibres, and drawn.
 """
 
@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.scores.noise.members import SILENCE, Memory
+from xb_muscle_ros.scores.noise.members import SILENCE, OrnsteinUhlenbeck
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0, MEMBERS, Source, TrialNoise
 from xb_muscle_ros.trials.trial import Trial
 
@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 
 LEAST_DIFFERENCES = 10
 """Samples of force that a trial needs."""
-# Noise of rat soleus fibre 18Dec2017a at 1 kHz has a lag-1 correlation of 0.91 to 0.98: it fades within 10 to 50 ms.
+# Noise of rat soleus fibre 18Dec2017a at 1 kHz has a lag-1 correlation of 0.91 to 0.98: it decays within 10 to 50 ms.
 _TAUS_S = (0.0074, 0.02, 0.054)
 _SHARES = (0.0, 0.5, 0.9)
 _NORMAL_MEDIAN = 0.6745
@@ -36,9 +36,9 @@ def _of_trial(trial: Trial) -> TrialNoise:
     time_s, force = trial.force_time_s, trial.measured_f0
     name, samples = trial.facts.trial, int(force.size)
     rows, weights = _neighbours(time_s)
-    left = np.sum(weights * force[rows], axis=1)
-    size = float(np.median(np.abs(left))) / _NORMAL_MEDIAN
-    freedom = max(0.5 * left.size, 2.0)
+    residual = np.sum(weights * force[rows], axis=1)
+    size = float(np.median(np.abs(residual))) / _NORMAL_MEDIAN
+    freedom = max(0.5 * residual.size, 2.0)
     if size < LEAST_SD_F0:
         return TrialNoise(name, Source.DIFFERENCES, samples, LEAST_SD_F0, freedom, SILENCE, (SILENCE,))
     lags = np.abs(time_s[rows][:, :, None] - time_s[rows][:, None, :])
@@ -48,7 +48,7 @@ def _of_trial(trial: Trial) -> TrialNoise:
             correlation = share * np.exp(-lags / tau_s) + (1.0 - share) * (lags == 0.0)
             # Variance of the residual of noise of variance 1.
             unit = np.einsum("ki,kij,kj->k", weights, correlation, weights)
-            found.append(Memory(size / float(np.sqrt(np.median(unit))), share, tau_s))
+            found.append(OrnsteinUhlenbeck(size / float(np.sqrt(np.median(unit))), share, tau_s))
     found.sort(key=lambda member: member.sd_f0)
     members = tuple(found[k * len(found) // MEMBERS] for k in range(MEMBERS))
     middle = found[len(found) // 2]

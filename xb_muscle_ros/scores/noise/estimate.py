@@ -18,7 +18,7 @@ from xb_muscle_ros.scores.noise.regressions import ORDER, Part, Regressions, cor
 
 Array = npt.NDArray[np.float64]
 
-# Sampling steps within this factor of each other have noise of one colour.
+# Sampling steps within this factor of each other have noise of one autocorrelation.
 _SAME_STEP = 1.2
 
 
@@ -61,15 +61,15 @@ def _members(own: Sequence[Part], of: Regressions) -> tuple[Regression, ...]:
     return tuple(
         Regression(
             weights=-filters[-1, -2::-1],
-            fresh_f0=float(sd),
+            innovation_sd_f0=float(sd),
             sd_f0=max(float(sd) * math.sqrt(float(sizes[0])), LEAST_SD_F0),
-            colour=correlation(filters),
+            autocorrelation=correlation(filters),
         )
         for filters, sizes, sd in zip(of.filters, of.sizes, fresh, strict=True)
     )
 
 
 def alike(step_s: float, other_s: float) -> bool:
-    """Whether noise sampled so has one colour; true where a step is unknown."""
+    """Whether noise sampled so has one autocorrelation; true where a step is unknown."""
     known = step_s > 0.0 and other_s > 0.0
     return not known or abs(math.log(step_s / other_s)) <= math.log(_SAME_STEP)

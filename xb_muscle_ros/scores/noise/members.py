@@ -1,4 +1,4 @@
-"""Models of a trial's noise: autoregressions where it is sampled evenly, fading memory in time where it is not."""
+"""Models of a trial's noise: autoregressions where it is sampled evenly, an Ornstein-Uhlenbeck process where not."""
 
 from __future__ import annotations
 
@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import lfilter
+from scipy.signal import lfilter, lfiltic
 
-from xb_muscle_ros.scores.noise.autocovariance import extended
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0
 
 Array = npt.NDArray[np.float64]
@@ -22,19 +21,21 @@ class Regression(NamedTuple):
 
     Attributes:
         weights: shape (order,).
-        fresh_f0: standard deviation of what is new in a sample, F0.
+        innovation_sd_f0: standard deviation of the innovations, F0.
         sd_f0: standard deviation, F0.
-        colour: correlation at lags 0, 1, ... samples, shape (order + 1,).
+        autocorrelation: at lags 0, 1, ... samples, shape (order + 1,).
     """
 
     weights: Array
-    fresh_f0: float
+    innovation_sd_f0: float
     sd_f0: float
-    colour: Array
+    autocorrelation: Array
 
     def draw(self, time_s: Array, factor: Array, random: np.random.Generator) -> Array:
         """See `model.Member`; samples are taken to be a step apart."""
-        white = (self.fresh_f0 * factor)[:, None] * random.standard_normal((factor.size, time_s.size + _BURN_IN))
+        white = (self.innovation_sd_f0 * factor)[:, None] * random.standard_normal(
+            (factor.size, time_s.size + _BURN_IN)
+        )
         # Along the last axis, where samples lie side by side: three times as fast.
         out: Array = lfilter([1.0], np.concatenate([[1.0], -self.weights]), white, axis=-1)[:, _BURN_IN:]
         return out
@@ -47,7 +48,12 @@ class Regression(NamedTuple):
 
     def autocovariance(self, lags: int) -> Array:
         """At lags 0 to `lags` - 1 samples, shape (lags,), F0²."""
-        return extended(self.sd_f0**2 * self.colour, lags)
+        known = self.sd_f0**2 * self.autocorrelation
+        if lags <= known.size:
+            return known[:lags]
+        recursion = np.concatenate([[1.0], -self.weights])
+        beyond, _ = lfilter([1.0], recursion, np.zeros(lags - known.size), zi=lfiltic([1.0], recursion, known[:0:-1]))
+        return np.concatenate([known, beyond])
 
     def at_lags(self, lags_s: Array, step_s: float) -> Array:
         """See `model.Member`."""
@@ -58,19 +64,19 @@ class Regression(NamedTuple):
 
     def times(self, factor: float) -> Regression:
         """See `model.Member`."""
-        return self._replace(fresh_f0=self.fresh_f0 * factor, sd_f0=self.sd_f0 * factor)
+        return self._replace(innovation_sd_f0=self.innovation_sd_f0 * factor, sd_f0=self.sd_f0 * factor)
 
 
-SILENCE = Regression(np.empty(0), LEAST_SD_F0, LEAST_SD_F0, np.array([1.0, 0.0]))
+SILENCE = Regression(np.zeros(1), LEAST_SD_F0, LEAST_SD_F0, np.array([1.0, 0.0]))
 
 
-class Memory(NamedTuple):
-    """White noise and noise that fades exponentially in time, at whatever times it is sampled.
+class OrnsteinUhlenbeck(NamedTuple):
+    """An Ornstein-Uhlenbeck process with white noise on top, at whatever times it is sampled.
 
     Attributes:
         sd_f0: standard deviation of both together, F0.
-        share: of the variance that fades; the rest is white.
-        tau_s: within which it fades, s.
+        share: of the variance that is the process's; the rest is white.
+        tau_s: within which its autocorrelation decays, s.
     """
 
     sd_f0: float
@@ -79,34 +85,39 @@ class Memory(NamedTuple):
 
     def draw(self, time_s: Array, factor: Array, random: np.random.Generator) -> Array:
         """See `model.Member`."""
-        fading, white = random.standard_normal((2, time_s.size, factor.size))
-        kept = self._kept(time_s)
-        fresh = np.sqrt(1.0 - kept**2)
-        for k in range(1, time_s.size):
-            fading[k] = kept[k - 1] * fading[k - 1] + fresh[k - 1] * fading[k]
-        both = np.sqrt(self.share) * fading + np.sqrt(1.0 - self.share) * white
+        process, white = random.standard_normal((2, time_s.size, factor.size))
+        process[1:] *= np.sqrt(-np.expm1(-2.0 * np.diff(time_s) / self.tau_s))[:, None]
+        process = recursion(time_s, process, self.tau_s)
+        both = np.sqrt(self.share) * process + np.sqrt(1.0 - self.share) * white
         out: Array = (self.sd_f0 * factor)[:, None] * both.T
         return out
 
     def variance_of_mean(self, time_s: Array) -> float:
         """See `model.Member`."""
-        # Sum of a sample's correlations with those before it, one sample after the other.
-        before, total = 0.0, 0.0
-        for kept in self._kept(time_s):
-            before = float(kept) * (before + 1.0)
-            total += before
-        return self.sd_f0**2 * (1.0 + 2.0 * self.share * total / time_s.size)
+        earlier = float(np.sum(recursion(time_s, np.ones(time_s.size), self.tau_s) - 1.0))
+        return self.sd_f0**2 * (1.0 + 2.0 * self.share * earlier / time_s.size)
 
     def at_lags(self, lags_s: Array, step_s: float) -> Array:
         """See `model.Member`."""
-        fading: Array = self.share * np.exp(-lags_s / self.tau_s) + (1.0 - self.share) * (lags_s == 0.0)
-        return self.sd_f0**2 * fading
+        decaying: Array = self.share * np.exp(-lags_s / self.tau_s) + (1.0 - self.share) * (lags_s == 0.0)
+        return self.sd_f0**2 * decaying
 
-    def times(self, factor: float) -> Memory:
+    def times(self, factor: float) -> OrnsteinUhlenbeck:
         """See `model.Member`."""
         return self._replace(sd_f0=self.sd_f0 * factor)
 
-    def _kept(self, time_s: Array) -> Array:
-        """Correlation of one sample's fading noise with the next one's, shape (n - 1,)."""
-        out: Array = np.exp(-np.diff(time_s) / self.tau_s)
-        return out
+
+def recursion(time_s: Array, given: Array, tau_s: float | Array) -> Array:
+    """What is given at each time, and what has not yet decayed of the times before, shape of `given`.
+
+    Args:
+        time_s: shape (n,), increasing, s.
+        given: shape (n, ...).
+        tau_s: time constants, s, of the shape that broadcasts with `given[0]`.
+    """
+    out = np.array(given, dtype=np.float64)
+    tau = np.asarray(tau_s, dtype=np.float64)
+    decay = np.exp(-np.diff(time_s).reshape(-1, *(1,) * tau.ndim) / tau)
+    for k in range(1, time_s.size):
+        out[k] += decay[k - 1] * out[k - 1]
+    return out

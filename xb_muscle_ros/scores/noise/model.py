@@ -1,4 +1,4 @@
-"""Noise as it is known: its size and colour in every trial, and draws that carry what stays unknown of both."""
+"""Noise as it is known: its scale and autocorrelation in every trial, and draws with what is not known of both."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class TrialNoise:
         source: from what it was taken.
         samples: of force that told of it.
         sd_f0: standard deviation, F0.
-        freedom: degrees of freedom with which the size is known, given the colour.
+        freedom: degrees of freedom with which the size is known, given the autocorrelation.
         likeliest: the model of this size.
         members: models to draw from, as probable as each other, from little noise to much.
     """
@@ -130,12 +130,12 @@ class NoiseModel:
             times_s: of the samples of each trial, s.
             draws: how many.
             random: where it comes from.
-            uncertain: draw size and colour as well, from what is not known of them.
+            uncertain: draw size and autocorrelation as well, from what is not known of them.
 
         Returns:
             Shape (samples of all trials, draws), F0, trials one below the other.
         """
-        # The same place in the order for all trials: what is wrong with the colour of one is wrong with the others'.
+        # The same place in the order for all trials: what is wrong with one autocorrelation is wrong with the others.
         picked = random.integers(MEMBERS, size=draws) if uncertain else None
         drawn = [noise.draw(time_s, picked, draws, random) for noise, time_s in zip(self.trials, times_s, strict=True)]
         return np.concatenate([np.empty((0, draws)), *drawn])

@@ -40,15 +40,22 @@ class Piece(NamedTuple):
     Attributes:
         time_s: shape (n,), increasing, s.
         force_f0: shape (n,), F0.
+        drift: what force may do there beside noise, orthonormal, shape (n, columns).
     """
 
     time_s: Array
     force_f0: Array
+    drift: Array
 
 
 def evenly_sampled(trial: Trial) -> bool:
     """Whether a trial's force has samples a step apart, jitter and gaps aside."""
-    steps = np.diff(trial.force_time_s)
+    return steps_evenly(trial.force_time_s)
+
+
+def steps_evenly(time_s: Array) -> bool:
+    """Whether samples are a step apart, jitter and gaps aside."""
+    steps = np.diff(time_s)
     if not steps.size:
         return True
     usual = float(np.median(steps))
@@ -72,13 +79,14 @@ def smooth_pieces(trial: Trial, short: bool = False) -> list[Piece]:
         time_s = trial.force_time_s[inside]
         if time_s.size < (_SHORT if short else LEAST):
             continue
-        columns = curves(time_s).shape[1]
+        drift = curves(time_s)
+        columns = drift.shape[1]
         if time_s.size < (columns + _SPARE if short else _FOR_EACH * (1 + columns)):
             continue
         travel_l0 = _steady_travel_l0(trial, float(time_s[0]), float(time_s[-1]))
         if travel_l0 is not None:
             group = still if abs(travel_l0) <= _tolerance_l0(trial) else moving
-            group.append(Piece(time_s, np.asarray(trial.measured_f0[inside])))
+            group.append(Piece(time_s, np.asarray(trial.measured_f0[inside]), drift))
     return still or moving
 
 
@@ -111,13 +119,13 @@ def _steady_travel_l0(trial: Trial, start_s: float, end_s: float) -> float | Non
 def curves(time_s: Array) -> Array:
     """What force may do in a piece: an orthonormal cubic and exponentials since its begin, shape (n, columns).
 
-    The fastest exponential fades within a usual step of the first ones.
+    The fastest exponential decays within a usual step of the first ones.
     """
     since_s = time_s - time_s[0]
     span_s, step_s = float(since_s[-1]), float(np.median(np.diff(time_s[:LEAST])))
     count = max(int(np.log(span_s / step_s) / np.log(_APART)), 0)
-    fading = np.exp(-since_s[:, None] / (span_s / _APART ** np.arange(1, count + 1)))
-    columns = np.concatenate([np.vander(2.0 * since_s / span_s - 1.0, _DEGREE + 1), fading], axis=1)
+    decaying = np.exp(-since_s[:, None] / (span_s / _APART ** np.arange(1, count + 1)))
+    columns = np.concatenate([np.vander(2.0 * since_s / span_s - 1.0, _DEGREE + 1), decaying], axis=1)
     directions, sizes, _ = np.linalg.svd(columns / np.linalg.norm(columns, axis=0), full_matrices=False)
     out: Array = directions[:, sizes > 1e-8 * sizes[0]]
     return out

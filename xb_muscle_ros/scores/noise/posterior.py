@@ -13,14 +13,14 @@ from xb_muscle_ros.scores.noise.regressions import ORDER, Part, regressions, squ
 Array = npt.NDArray[np.float64]
 
 # Partial correlations as inverse hyperbolic tangents: how far they go (0.995), and what to expect of force recordings
-# (rat soleus fibre 18Dec2017a at 1 kHz has lag-1 correlations of 0.91 to 0.98, and hum: noise that fades within 18 ms,
+# (rat soleus fibre 18Dec2017a at 1 kHz has lag-1 correlations of 0.91 to 0.98, and hum: noise that decays within 18 ms,
 # and so the less from sample to sample the longer these are apart). White noise overrules it in 50 samples.
 _REACH, _PRIOR_SD = 3.0, 0.7
 _PRIOR_TAU_S, _PRIOR_MOST = 0.0183, 2.5
 # Models that are tried for those from which draws come, and how much wider than a normal posterior they lie.
 _TRIED, _WIDER = 480, 1.5
-# Other trials' parts bear on a trial's colour as if they had this many samples together at most: colour at pCa 9 is not
-# that at pCa 4.5.
+# Other trials' parts bear on a trial's autocorrelation as if they had this many samples together at most: that at pCa 9
+# is not that at pCa 4.5.
 _OTHERS = 100
 # Newton steps at most; most studies take five.
 _STEPS = 25
@@ -100,8 +100,8 @@ def _costs(parts: Sequence[Part], shares: Sequence[float], z: Array) -> Array:
     Returns:
         Shape (many,).
     """
-    left, log_determinants = squares(parts, regressions(z))
-    of_parts = 0.5 * (np.array([p.freedom for p in parts]) * np.log(left) + log_determinants)
+    innovations, log_determinants = squares(parts, regressions(z))
+    of_parts = 0.5 * (np.array([p.freedom for p in parts]) * np.log(innovations) + log_determinants)
     costs: Array = (
         of_parts @ np.array(shares) + 0.5 * np.sum((z - prior_mean(parts[0].step_s)) ** 2, axis=1) / _PRIOR_SD**2
     )

@@ -43,12 +43,12 @@ class Part:
         """
         self.step_s = step_s
         n, count = drift.shape
-        left = force_f0 - drift @ (drift.T @ force_f0)
-        self.silent = float(np.sqrt(np.mean(left**2))) < LEAST_SD_F0
+        residual = force_f0 - drift @ (drift.T @ force_f0)
+        self.silent = float(np.sqrt(np.mean(residual**2))) < LEAST_SD_F0
         self.samples, self.freedom = n, float(n - count)
         # Force first, then the columns of drift, the last of them perhaps empty: all are whitened together.
         columns = np.zeros((1 + width, n))
-        columns[0], columns[1 : 1 + count] = left, drift.T
+        columns[0], columns[1 : 1 + count] = residual, drift.T
         self.empty = np.diag(np.where(np.arange(width) < count, 0.0, 1.0))
         self.begin = columns[:, :ORDER]
         # Products of all columns at all lags: what is new in the samples is a sum over them, however long the part.
@@ -60,9 +60,9 @@ class Regressions(NamedTuple):
     """Autoregressions of order 0, 1, ... of partial correlations, shape (many, ...).
 
     Attributes:
-        filters: row k has what is new in sample k, given those before it, shape (many, order + 1, order + 1); the last
-            row holds for all later samples.
-        sizes: variance of what is new, in units of the last, shape (many, order + 1).
+        filters: row k gives the innovation of sample k, shape (many, order + 1, order + 1); the last row holds
+            for all later samples.
+        sizes: variance of the innovations, in units of the last, shape (many, order + 1).
     """
 
     filters: Array
@@ -78,13 +78,13 @@ def regressions(z: Array) -> Regressions:
         last, tanh = filters[:, k - 1, :k], partial[:, k - 1, None]
         filters[:, k, 1 : k + 1] = last
         filters[:, k, :k] -= tanh * last[:, ::-1]
-    left = np.cumprod(1.0 - partial**2, axis=1)
-    sizes = np.concatenate([np.ones((z.shape[0], 1)), left], axis=1)
+    innovation = np.cumprod(1.0 - partial**2, axis=1)
+    sizes = np.concatenate([np.ones((z.shape[0], 1)), innovation], axis=1)
     return Regressions(filters, sizes / sizes[:, -1:])
 
 
 def squares(parts: Sequence[Part], of: Regressions) -> tuple[Array, Array]:
-    """Squares of what is new in the samples, drift taken out, F0², and log-determinants, shape (many, parts)."""
+    """Sums of squared innovations, drift taken out, F0², and log-determinants, shape (many, parts)."""
     width = parts[0].empty.shape[0]
     last = of.filters[:, -1, ::-1]
     pairs = (last[:, :, None] * last[:, None, :]).reshape(last.shape[0], -1)
@@ -93,12 +93,12 @@ def squares(parts: Sequence[Part], of: Regressions) -> tuple[Array, Array]:
     rows = of.filters[:, :ORDER, :ORDER] / np.sqrt(of.sizes[:, :ORDER, None])
     begin = np.stack([p.begin for p in parts]) @ np.swapaxes(rows, -1, -2)[:, None]
     gram = gram + begin @ np.swapaxes(begin, -1, -2)
-    left, log_drift = restricted(gram, np.stack([p.empty for p in parts]))
-    return left, np.sum(np.log(of.sizes), axis=1)[:, None] + log_drift
+    residual, log_drift = restricted(gram, np.stack([p.empty for p in parts]))
+    return residual, np.sum(np.log(of.sizes), axis=1)[:, None] + log_drift
 
 
 def restricted(gram: Array, empty: Array) -> tuple[Array, Array]:
-    """Squares of whitened force that are left beside whitened drift, and the log-determinant of drift's own.
+    """Residual sum of squares of whitened force beside whitened drift, and the log-determinant of drift's own.
 
     Args:
         gram: products of force, first, and drift, shape (..., 1 + width, 1 + width).
@@ -107,8 +107,8 @@ def restricted(gram: Array, empty: Array) -> tuple[Array, Array]:
     drift, across = gram[..., 1:, 1:], gram[..., 1:, :1]
     trace = np.trace(drift, axis1=-1, axis2=-2)[..., None, None]
     drift = drift + 1e-12 * trace * np.eye(drift.shape[-1]) + empty
-    left = gram[..., 0, 0] - np.sum(across * np.linalg.solve(drift, across), axis=(-1, -2))
-    return np.maximum(left, 1e-300), np.linalg.slogdet(drift)[1]
+    residual = gram[..., 0, 0] - np.sum(across * np.linalg.solve(drift, across), axis=(-1, -2))
+    return np.maximum(residual, 1e-300), np.linalg.slogdet(drift)[1]
 
 
 def correlation(filters: Array) -> Array:

@@ -11,11 +11,11 @@ import numpy.typing as npt
 from scipy.special import ndtri
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.scores.noise import ornstein_uhlenbeck as ou
 from xb_muscle_ros.scores.noise.differences import LEAST_DIFFERENCES, by_differences
 from xb_muscle_ros.scores.noise.estimate import alike, by_regressions
-from xb_muscle_ros.scores.noise.memories import Timed, by_memories
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0, MEMBERS, NoiseModel, Source, TrialNoise
-from xb_muscle_ros.scores.noise.pieces import Piece, curves, evenly_sampled, smooth_pieces
+from xb_muscle_ros.scores.noise.pieces import Piece, evenly_sampled, smooth_pieces
 from xb_muscle_ros.scores.noise.regressions import Part
 from xb_muscle_ros.scores.noise.windows import LEAST, Window, isometric_window
 from xb_muscle_ros.scores.steady import steady_part
@@ -110,22 +110,21 @@ def by_windows(windows: Sequence[Window]) -> dict[str, TrialNoise]:
 def by_curves(pieces: Mapping[str, Sequence[Piece]], even: Mapping[str, bool]) -> dict[str, TrialNoise]:
     """Noise of trials that have smooth pieces, from what these leave.
 
-    Autoregressions where samples come evenly and fast enough for hum to be seen, else memories that fade in time.
+    Autoregressions where samples come evenly and fast enough for hum to be seen, else an Ornstein-Uhlenbeck process.
 
     Args:
         pieces: of each trial.
         even: whether its force is sampled evenly.
     """
-    drifts = {name: [(p, curves(p.time_s)) for p in of] for name, of in pieces.items() if of}
     fast = {
-        n: of
-        for n, of in drifts.items()
-        if even[n] and _step_s(of[0][0].time_s) <= _HUM_S and all(p.time_s.size >= LEAST for p, _ in of)
+        n
+        for n, of in pieces.items()
+        if of and even[n] and _step_s(of[0].time_s) <= _HUM_S and all(p.time_s.size >= LEAST for p in of)
     }
-    width = max((drift.shape[1] for of in fast.values() for _, drift in of), default=0)
-    parts = {n: [Part(_step_s(p.time_s), p.force_f0, drift, width) for p, drift in of] for n, of in fast.items()}
-    timed = {n: [Timed(p.time_s, p.force_f0, drift) for p, drift in of] for n, of in drifts.items() if n not in fast}
-    return by_regressions(parts, Source.CURVE) | by_memories(timed, Source.CURVE)
+    width = max((p.drift.shape[1] for n in fast for p in pieces[n]), default=0)
+    parts = {n: [Part(_step_s(p.time_s), p.force_f0, p.drift, width) for p in pieces[n]] for n in pieces if n in fast}
+    timed = {n: [ou.Part(*p) for p in of] for n, of in pieces.items() if of and n not in fast}
+    return by_regressions(parts, Source.CURVE) | ou.by_ornstein_uhlenbeck(timed, Source.CURVE)
 
 
 def _step_s(time_s: Array) -> float:
@@ -176,7 +175,7 @@ def _power_of_force(log_sd: Array, log_level: Array) -> tuple[float, float, floa
     apart, off = log_level - np.mean(log_level), log_sd - np.mean(log_sd)
     spread = max(float(np.std(log_sd, ddof=1)), 1e-3) if log_sd.size > 1 else _SPREAD
     # Data and prior, each by its information.
-    told, prior = float(apart @ apart) / spread**2, _POWER_SD**-2
-    power = (float(apart @ off) / spread**2 + prior * _POWER) / (told + prior)
+    information, prior = float(apart @ apart) / spread**2, _POWER_SD**-2
+    power = (float(apart @ off) / spread**2 + prior * _POWER) / (information + prior)
     around = float(np.sqrt(np.sum((off - power * apart) ** 2) / (log_sd.size - 1))) if log_sd.size > 1 else _SPREAD
-    return power, (told + prior) ** -0.5, around
+    return power, (information + prior) ** -0.5, around

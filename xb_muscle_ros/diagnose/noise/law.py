@@ -1,8 +1,8 @@
-"""The law of a residual: how it remembers length changes and what it grows with, even where no mechanism fits.
+"""The law of a residual: its response to length changes and what it grows with, even where no mechanism fits.
 
-Memories of velocity, x' = v - x/τ, are what viscoelastic, cross-bridge and calcium-dependent elements have in common
-to first order; a drag is a short one, a spring a long one. What the fit's coordinates could have taken is taken out of
-each memory before it is compared with the residual, so that only what was left can speak.
+Exponential responses to velocity, x' = v - x/τ (a Prony series), are what viscoelastic, cross-bridge and
+calcium-dependent elements have in common to first order; a drag is a short one, a spring a long one. What the fit's
+coordinates could have taken is taken out of each before it is compared with the residual.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,14 +18,15 @@ from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import nnls
 
 from xb_muscle_ros.diagnose.noise.cells import Residual, check
-from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.linear_fit import LinearFit
+from xb_muscle_ros.scores.noise.members import recursion
 
 Array = npt.NDArray[np.float64]
 
 TAU_S = np.geomspace(0.002, 5.0, 18)
 CONSTANT = "constant"
-# Ridge on the weights against that of data: keeps memories that the fit nearly took out from growing without bound.
+# Ridge on the weights against that of data: keeps responses that the fit nearly took out from growing without bound.
 _RIDGE = 1e-4
 # Time constants within this factor of the largest one's are one law.
 _NEAR = 4.0
@@ -37,13 +38,13 @@ class Law(NamedTuple):
 
     Attributes:
         tau_s: time constants that were offered, shape (n,), s.
-        weight_f0: root-mean-square force of each memory in the recordings before any refit, shape (n,), F0, with the
+        weight_f0: root-mean-square force of each response in the recordings before any refit, shape (n,), F0, with the
             sign of the law.
-        gain_f0_per_l0: of each memory, shape (n,): force per unit of the memory where what it scales with is 1.
+        gain_f0_per_l0: of each response, shape (n,): force per unit of it where what it scales with is 1.
         time_constant_s: the dominant one.
         scales_with: ``constant`` or a name among the scalings.
         sign: 1: measured force lacks in the model with the sign of velocity; -1: against it.
-        explained: share of the residual's mean square that the law tells of trials left out (of one trial: of itself).
+        explained: share of the residual's mean square that the law predicts of trials left out (one trial: of itself).
         others: the same share for what else it could scale with, by name.
     """
 
@@ -58,48 +59,24 @@ class Law(NamedTuple):
 
     @property
     def stiffness_f0_per_l0(self) -> float:
-        """Of all memories together: force per length of a sudden change."""
+        """Of all responses together: force per length of a sudden change."""
         return float(np.sum(self.gain_f0_per_l0))
 
-    @property
-    def viscosity_f0_s_per_l0(self) -> float:
-        """Of all memories together: force per velocity of a change that goes on for longer than they last."""
-        return float(self.gain_f0_per_l0 @ self.tau_s)
 
-    def to_json(self) -> dict[str, Any]:
-        """Plain data; `gain` is the stiffness."""
-        return {
-            "time_constant_s": self.time_constant_s,
-            "scales_with": self.scales_with,
-            "gain": self.stiffness_f0_per_l0,
-            "explained": self.explained,
-            "tau_s": self.tau_s.tolist(),
-            "weight_f0": self.weight_f0.tolist(),
-        }
-
-
-def memories(time_s: Array, length_l0: Array, tau_s: Array) -> Array:
-    """Memories x' = v - x/τ from rest at the first sample, exact for length that is straight between samples.
+def exponential_basis(time_s: Array, change_l0: Array, tau_s: Array) -> Array:
+    """Responses x' = v - x/τ from rest at the first sample, exact for length that is straight between samples.
 
     Args:
-        time_s, length_l0: shape (n,), s and L0.
+        time_s: shape (n,), s.
+        change_l0: of length from sample to sample, shape (n - 1,), L0.
         tau_s: shape (k,), s.
 
     Returns:
         Shape (n, k), L0.
     """
-    return driven(time_s, np.diff(length_l0), tau_s)
-
-
-def driven(time_s: Array, change: Array, tau_s: Array) -> Array:
-    """Memories as of `memories`, driven by the length changes from sample to sample, shape (n - 1,), L0."""
-    out = np.zeros((time_s.size, tau_s.size))
     dt = np.diff(time_s)[:, None]
-    kept = np.exp(-dt / tau_s)
-    given = change[:, None] / dt * tau_s * -np.expm1(-dt / tau_s)
-    for k in range(change.size):
-        out[k + 1] = kept[k] * out[k] + given[k]
-    return out
+    given = change_l0[:, None] / dt * tau_s * -np.expm1(-dt / tau_s)
+    return recursion(time_s, np.concatenate([np.zeros((1, tau_s.size)), given]), tau_s)
 
 
 def law(
@@ -108,7 +85,7 @@ def law(
     scalings: Mapping[str, Sequence[Array]],
     tau_s: Array = TAU_S,
 ) -> Law | None:
-    """The law of what a fit left; None where no memory tells anything of a trial left out.
+    """The law of a fit's residual; None where no response predicts anything of a trial left out.
 
     Non-negative least squares over all time constants at once, with either sign, for each thing that the law may
     scale with; the best in cross-validation over trials counts.
@@ -127,13 +104,13 @@ def law(
     edges = np.cumsum([0, *(r.time_s.size for r in residuals)])
     if float(np.sqrt(np.mean(target**2))) < _LEAST_F0:
         return None
-    plain = np.concatenate([memories(r.time_s, r.length_l0, tau_s) for r in residuals])
+    plain = np.concatenate([exponential_basis(r.time_s, np.diff(r.length_l0), tau_s) for r in residuals])
     best: tuple[float, str, int, Array, Array] | None = None
     shares: dict[str, float] = {}
     for name, scale in known.items():
         columns = plain * scale[:, None]
         sizes = np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300)
-        products = _Products(fit.left(columns / sizes), target, edges)
+        products = _Products(fit.residual(columns / sizes), target, edges)
         for sign in (1, -1):
             share = products.explained(sign)
             shares[name] = max(share, shares.get(name, -math.inf))
@@ -164,7 +141,7 @@ class _Products:
         self.parts = [slice(a, b) for a, b in itertools.pairwise(edges)]
         self.gram = np.array([columns[s].T @ columns[s] for s in self.parts])
         self.across = np.array([columns[s].T @ target[s] for s in self.parts])
-        # In units of columns before the fit took its part: a memory that it took stays small.
+        # In units of columns before the fit took its part: a response that it took stays small.
         self.ridge = _RIDGE * target.size * np.eye(columns.shape[1])
 
     def weights(self, sign: int, without: int | None) -> Array:
@@ -179,8 +156,8 @@ class _Products:
         single = len(self.parts) == 1
         missed = 0.0
         for i, part in enumerate(self.parts):
-            told = self.columns[part] @ (sign * self.weights(sign, None if single else i))
-            missed += float(np.sum((self.target[part] - told) ** 2))
+            predicted = self.columns[part] @ (sign * self.weights(sign, None if single else i))
+            missed += float(np.sum((self.target[part] - predicted) ** 2))
         return 1.0 - missed / float(self.target @ self.target)
 
 

@@ -1,8 +1,8 @@
-"""What can be told of a held-out trial's residual without any physics: the bound that a mechanism is measured by.
+"""Non-parametric discrepancy: what predicts a held-out trial's residual without physics, the benchmark of a mechanism.
 
-Ridge regression on a dictionary: memories of stretch and of shortening apart, over time constants from 2 ms to 5 s,
-and of length itself, each scaled by nothing, activation, calcium or force. How much of the dictionary is used, and how
-freely, is chosen by cross-validation over the training trials; where it does not help them, nothing is told.
+Ridge regression on a dictionary: exponential responses to stretch and to shortening, time constants from 2 ms to 5 s,
+and length itself, each scaled by nothing, activation, calcium or force. How much of the dictionary is used, and how
+freely, is chosen by cross-validation over the training trials; where it does not help them, nothing is predicted.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.noise.cells import Residual
-from xb_muscle_ros.diagnose.noise.kernel import driven, scales
-from xb_muscle_ros.diagnose.noise.linear_fit import LinearFit
+from xb_muscle_ros.diagnose.noise.law import exponential_basis, scales
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.fit.linear_fit import LinearFit
 
 Array = npt.NDArray[np.float64]
 
 _TAU_S = np.geomspace(0.002, 5.0, 8)
 # Against the mean square of a column before the fit took its part.
 _RIDGES = np.geomspace(1e-5, 1.0, 11)
-# A smaller share of the mean square is not worth foretelling.
+# A smaller share of the mean square is not worth predicting.
 _LEAST_SHARE = 0.05
 
 
-class Flexible(NamedTuple):
+class Discrepancy(NamedTuple):
     """A discrepancy that knows no physics.
 
     Attributes:
-        predicted_f0: residual foretold of each held-out trial, in their order, F0.
-        scalings: what its terms scale with; empty where nothing is told.
+        predicted_f0: predicted residual of each held-out trial, in their order, F0.
+        scalings: what its terms scale with; empty where nothing is predicted.
         ridge: how strongly weights are held to 0.
-        explained: share of the training residual's mean square that was told of trials left out.
+        explained: share of the training residual's mean square that was predicted of trials left out.
     """
 
     predicted_f0: tuple[Array, ...]
@@ -44,17 +44,17 @@ class Flexible(NamedTuple):
     explained: float
 
 
-def flexible_fit(
+def discrepancy(
     residuals: Sequence[Residual], held_out: Sequence[bool], fit: LinearFit, scalings: Mapping[str, Sequence[Array]]
-) -> Flexible:
-    """Foretell the residual of held-out trials from that of the training trials.
+) -> Discrepancy:
+    """Predict the residual of held-out trials from that of the training trials.
 
     Args:
         residuals: of all trials, under the coordinates that were fitted to the training trials.
         held_out: for each trial.
         fit: the fit's normal equations, samples in the order of the residuals, weights 0 where held out: what the
             training trials made the coordinates take is taken out of the held-out ones.
-        scalings: by name, for each trial, at the residual's times; see `kernel.law`.
+        scalings: by name, for each trial, at the residual's times; see `law.law`.
 
     Raises:
         UserError: inputs that do not belong together, no training trial, or weights on held-out samples.
@@ -76,26 +76,26 @@ def flexible_fit(
     for name, scale in known.items():
         own = np.column_stack([plain, np.ones(target.size)]) * scale[:, None]
         size = np.sqrt(np.mean(np.concatenate([own[part] for part in train]) ** 2, axis=0))
-        # Lengths that never changed in training tell nothing.
+        # Lengths that never changed in training say nothing.
         own = own[:, size > 1e-12] / size[size > 1e-12]
         columns.append(own)
         owner += [name] * own.shape[1]
-    return _chosen(fit.left(np.column_stack(columns)), np.array(owner), target, train, held)
+    return _chosen(fit.residual(np.column_stack(columns)), np.array(owner), target, train, held)
 
 
 def _terms(r: Residual) -> Array:
-    """Memories of stretch and of shortening, length and its square; shape (n, terms)."""
+    """Responses to stretch and to shortening, length and its square; shape (n, terms)."""
     change = np.diff(r.length_l0)
     length = r.length_l0 - r.length_l0[0]
-    stretch = driven(r.time_s, np.maximum(change, 0.0), _TAU_S)
-    shortening = driven(r.time_s, np.minimum(change, 0.0), _TAU_S)
+    stretch = exponential_basis(r.time_s, np.maximum(change, 0.0), _TAU_S)
+    shortening = exponential_basis(r.time_s, np.minimum(change, 0.0), _TAU_S)
     return np.column_stack([stretch, shortening, length, length**2])
 
 
 def _chosen(
     columns: Array, owner: npt.NDArray[np.str_], target: Array, train: list[slice], held: list[slice]
-) -> Flexible:
-    """The dictionary and ridge that tell most of training trials left out, and what they tell of the held-out ones."""
+) -> Discrepancy:
+    """The dictionary and ridge that predict most of training trials left out, and their predictions of held-out."""
     gram = np.array([columns[part].T @ columns[part] for part in train])
     across = np.array([columns[part].T @ target[part] for part in train])
     samples = np.array([part.stop - part.start for part in train])
@@ -111,11 +111,11 @@ def _chosen(
         if total[k] > max(best[0], _LEAST_SHARE * silent.sum()) and not _luck(gain[k], silent):
             best = (float(total[k]), tuple(chosen), float(_RIDGES[k]))
     if not best[1]:
-        return Flexible(tuple(np.zeros(part.stop - part.start) for part in held), (), 0.0, 0.0)
+        return Discrepancy(tuple(np.zeros(part.stop - part.start) for part in held), (), 0.0, 0.0)
     which = np.flatnonzero(np.isin(owner, best[1]))
     weights = _ridge(gram.sum(axis=0)[which][:, which], across.sum(axis=0)[which], best[2] * samples.sum())
-    told = tuple(columns[part][:, which] @ weights for part in held)
-    return Flexible(told, best[1], best[2], best[0] / float(silent.sum()))
+    predicted = tuple(columns[part][:, which] @ weights for part in held)
+    return Discrepancy(predicted, best[1], best[2], best[0] / float(silent.sum()))
 
 
 def _luck(gain: Array, silent: Array) -> bool:

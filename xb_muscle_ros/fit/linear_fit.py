@@ -1,4 +1,4 @@
-"""What a fit does to a small change of the data, to first order: how far its coordinates go along, and what is left."""
+"""What a fit does to a small change of the data, to first order: how far its coordinates move, and what is left."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import cho_factor, cho_solve
 
 from xb_muscle_ros.errors import UserError
 
 Array = npt.NDArray[np.float64]
+
+# Directions of less than this share of the largest curvature, in units of each coordinate's own, are not seen.
+_UNSEEN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -47,54 +49,61 @@ class LinearFit:
             if not np.all(np.isfinite(getattr(self, name))):
                 raise UserError(f"{name} of the fit are not finite; leave the coordinate or trial at fault out")
 
-    @staticmethod
-    def nothing(samples: int) -> LinearFit:
-        """A model that was not fitted."""
-        return LinearFit(np.zeros((samples, 0)), np.ones(samples), np.zeros(0))
-
     @cached_property
     def information(self) -> Array:
         """Of the priors, shape (coordinates, coordinates)."""
         return np.diag(self.prior) if self.prior.ndim == 1 else self.prior
 
     @cached_property
-    def _weighted(self) -> Array:
+    def score(self) -> Array:
+        """How a sample bears on the gradient of the cost, shape (samples, coordinates)."""
         out: Array = self.slopes * (self.weights**2)[:, None]
         return out
 
     @cached_property
-    def _factor(self) -> tuple[tuple[Array, bool], Array]:
-        """Cholesky factor of the curvature, scaled to a unit diagonal, and the scale."""
-        curvature = self.slopes.T @ self._weighted + self.information
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(curvature), 1e-300))
-        scaled = curvature * scale * scale[:, None]
-        # Coordinates that the data cannot tell apart share what they do.
-        return cho_factor(scaled + 1e-10 * np.eye(scale.size)), scale
+    def _seen(self) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+        """Root of the inverse of the curvature, its directions, and which of them data or priors see."""
+        curvature = self.slopes.T @ self.score + self.information
+        # In units of each coordinate's own curvature, so that the inverse does not depend on units.
+        unit = np.sqrt(np.maximum(np.diag(curvature), 1e-12))
+        values, vectors = np.linalg.eigh(curvature / unit / unit[:, None])
+        seen = values > _UNSEEN * np.max(values, initial=0.0)
+        root = vectors / np.sqrt(np.where(seen, values, np.inf)) / unit[:, None]
+        return root, vectors, seen
+
+    @cached_property
+    def inverse(self) -> Array:
+        """Inverse of the curvature where it is seen: the covariance, had every weight its sample's own noise."""
+        root, _, _ = self._seen
+        out: Array = root @ root.T
+        return out
+
+    @property
+    def weak(self) -> npt.NDArray[np.bool_]:
+        """Coordinates whose direction the data hardly see, shape (coordinates,)."""
+        _, vectors, seen = self._seen
+        out: npt.NDArray[np.bool_] = np.sqrt(np.sum(vectors[:, ~seen] ** 2, axis=1)) > 0.1
+        return out
 
     def moved(self, change: Array) -> Array:
-        """How far the coordinates go along with a change of the data, shape (coordinates, columns).
+        """How far the coordinates move with a change of the data, shape (coordinates, columns).
 
         Args:
             change: shape (samples, columns), F0.
         """
-        if not self.slopes.shape[1]:
-            return np.zeros((0, change.shape[1]))
-        return self.solved(self._weighted.T @ change)
+        return self.solved(self.score.T @ change)
 
     def solved(self, score: Array) -> Array:
         """Coordinates that meet a score, shape (coordinates, columns) both."""
-        if not score.shape[0]:
-            return score
-        factor, scale = self._factor
-        found: Array = scale[:, None] * cho_solve(factor, scale[:, None] * score)
-        return found
+        out: Array = self.inverse @ score
+        return out
 
-    def left(self, change: Array) -> Array:
-        """What a change of the data leaves in the residual after the refit, shape (samples, columns)."""
+    def residual(self, change: Array) -> Array:
+        """What a change of the data leaves after the refit, shape (samples, columns)."""
         out: Array = change - self.slopes @ self.moved(change)
         return out
 
-    def pulled(self, draws: int, random: np.random.Generator) -> Array:
+    def prior_residual(self, draws: int, random: np.random.Generator) -> Array:
         """Residuals that the priors cause when the truth lies where they expect it, shape (samples, draws)."""
         values, vectors = np.linalg.eigh(self.information)
         known = values > 1e-12 * max(float(values.max(initial=0.0)), 1e-300)
