@@ -4,81 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import NamedTuple
 
-from xb_muscle_ros.diagnose.names import FAMILY, Name
+from xb_muscle_ros.diagnose.answers import FAMILY
+from xb_muscle_ros.diagnose.names import Name
+from xb_muscle_ros.models.catalogue import CATALOGUE
 
-
-class Words(NamedTuple):
-    """Of one thing that a diagnosis may name.
-
-    Attributes:
-        name: how a sentence calls it.
-        meaning: what it is, in a line that follows a colon.
-    """
-
-    name: str
-    meaning: str
-
-
-_WORDS: Mapping[Name, Words] = {
-    Name.VISCOUS_DRAG: Words("viscous drag", "a force proportional to the speed of stretch"),
-    Name.PASSIVE_VISCOELASTICITY: Words(
-        "passive viscoelasticity",
-        "springs with dashpots beside the cross-bridges, so that force decays after a stretch",
-    ),
-    Name.WEAKLY_BOUND_HEADS: Words(
-        "weakly bound heads", "heads that bind and let go quickly and hold for a moment when the fibre is stretched"
-    ),
-    Name.FILAMENT_FRICTION: Words(
-        "friction of bound heads",
-        "links that bound heads make are elastic for a short way, slip, and take time to form anew",
-    ),
-    Name.ACTIVE_TITIN: Words(
-        "active titin", "a spring that engages when the fibre is activated and is stretched from there on"
-    ),
-    Name.STATIC_CALCIUM_STIFFNESS: Words(
-        "static calcium-dependent stiffness", "a spring whose stiffness follows calcium, not force"
-    ),
-    Name.LENGTH_DEPENDENT_ACTIVATION: Words(
-        "length-dependent activation", "a longer fibre is more sensitive to calcium"
-    ),
-    Name.LATTICE_SPACING: Words(
-        "lattice spacing", "heads attach faster when the fibre is longer and its lattice tighter"
-    ),
-    Name.FILAMENT_OVERLAP: Words("filament overlap", "the number of heads within reach changes with length"),
-    Name.STRAIN_RECRUITED_HEADS: Words(
-        "heads recruited by strain", "stretch wakes heads that were resting on the thick filament"
-    ),
-    Name.PERSISTENT_THICK_FILAMENT: Words(
-        "persistent thick filament",
-        "heads that force has woken stay awake after force is lost, and go to rest more slowly than the model has it",
-    ),
-    Name.FORCIBLE_DETACHMENT: Words(
-        "forcible detachment", "heads stretched too far are torn off and bind again quickly"
-    ),
-    Name.NONLINEAR_CROSSBRIDGE: Words(
-        "non-linear cross-bridges", "the stiffness of a head changes with how far it is stretched"
-    ),
-    Name.HALF_SARCOMERE_SPREAD: Words(
-        "uneven half-sarcomeres", "stronger half-sarcomeres shorten at the cost of weaker ones in series"
-    ),
-    Name.SERIES_COMPLIANCE: Words("series compliance", "a spring in series takes up part of the length change"),
-    Name.THIN_FILAMENT_COOPERATIVITY: Words(
-        "thin-filament cooperativity", "bound heads and active sites help their neighbours to become active"
-    ),
-    Name.THICK_FILAMENT_COOPERATIVITY: Words(
-        "thick-filament cooperativity", "force wakes heads that were resting on the thick filament"
-    ),
-    Name.TEMPERATURE: Words("temperature", "the recordings were made warmer or colder than the model assumes"),
-    Name.PHOSPHATE: Words("phosphate", "phosphate in the solution lets heads detach before they have done their work"),
-    Name.PCA_SHIFT: Words("pCa shift", "a solution had more or less free calcium than its label says"),
-    Name.RUN_DOWN: Words("run-down", "the fibre lost force from trial to trial"),
-    Name.FORCE_OFFSET: Words("force offset", "the transducer did not read zero at zero force"),
-    Name.FORCE_DRIFT: Words("force drift", "the reading of the transducer crept during a trial"),
-    Name.LENGTH_GAIN: Words("length gain", "the length changes were larger or smaller than recorded"),
-    Name.TIME_SHIFT: Words("time shift", "force and length were recorded out of step"),
-    Name.TRANSDUCER_LAG: Words("transducer lag", "the transducer follows force with a delay"),
+# Name and meaning of measurement artefacts; mechanisms bring theirs.
+_ARTEFACTS: Mapping[Name, tuple[str, str]] = {
+    Name.PCA_SHIFT: ("pCa shift", "a solution had more or less free calcium than its label says"),
+    Name.RUN_DOWN: ("run-down", "the fibre lost force from trial to trial"),
+    Name.FORCE_OFFSET: ("force offset", "the transducer did not read zero at zero force"),
+    Name.FORCE_DRIFT: ("force drift", "the reading of the transducer crept during a trial"),
+    Name.LENGTH_GAIN: ("length gain", "the length changes were larger or smaller than recorded"),
+    Name.TIME_SHIFT: ("time shift", "force and length were recorded out of step"),
+    Name.TRANSDUCER_LAG: ("transducer lag", "the transducer follows force with a delay"),
 }
 _FAMILIES: Mapping[str, str] = {
     "parallel_viscoelasticity": "parallel viscoelasticity",
@@ -125,12 +64,12 @@ def human(name: str) -> str:
     """A mechanism, fault or pair as a sentence calls it."""
     if name == "base":
         return "the base model"
-    return " with ".join(_one(part).name for part in parts(name)) or name
+    return " with ".join(_one(part)[0] for part in parts(name)) or name
 
 
 def meaning(name: str) -> str:
     """What it is, in one line; empty where nothing is known."""
-    return "; ".join(m for m in (_one(part).meaning for part in parts(name)) if m)
+    return "; ".join(m for m in (_one(part)[1] for part in parts(name)) if m)
 
 
 def family_words(family: str) -> str:
@@ -140,8 +79,7 @@ def family_words(family: str) -> str:
 
 def family_of(name: str) -> str | None:
     """Family of a known name, else None."""
-    known = {str(n.value): family for n, family in FAMILY.items()}
-    return known.get(name)
+    return FAMILY.get(Name(name))
 
 
 def phase_words(phase: str) -> str:
@@ -193,8 +131,8 @@ def chance(p_value: float) -> str:
     return "in fewer than 1 of 10000 repeats"
 
 
-def _one(name: str) -> Words:
-    try:
-        return _WORDS[Name(name)]
-    except ValueError:
-        return Words(name.replace("_", " "), "")
+def _one(name: str) -> tuple[str, str]:
+    """Name and meaning of one mechanism or artefact."""
+    if name in CATALOGUE:
+        return CATALOGUE[name].title, CATALOGUE[name].meaning
+    return _ARTEFACTS.get(Name(name), (name.replace("_", " "), ""))

@@ -6,8 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar, NamedTuple
 
-from xb_muscle_ros.mechanisms.base import GaussianSpread, Parameter, Quantities, State, StrainRate
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Expr, GaussianSpread, Parameter, Quantities, State, StrainRate
 
 
 class Moments(NamedTuple):

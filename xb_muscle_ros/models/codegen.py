@@ -8,7 +8,7 @@ from typing import Any
 
 import sympy
 
-from xb_muscle_ros.mechanisms.base import Parameter
+from xb_muscle_ros.mechanisms import Parameter
 from xb_muscle_ros.models.composition import INPUTS, OUTPUTS, Equations, Model
 from xb_muscle_ros.models.elimination import Elimination
 from xb_muscle_ros.models.factoring import replaced

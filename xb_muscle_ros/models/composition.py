@@ -9,10 +9,13 @@ from typing import Any
 
 from xb_muscle_ros.distribution.base import Representation, Settling
 from xb_muscle_ros.distribution.gaussian import Gaussian
-from xb_muscle_ros.mechanisms.base import (
+from xb_muscle_ros.mechanisms import (
     Attachment,
     Detachment,
+    Expr,
+    Extra,
     Family,
+    InSeries,
     Mechanism,
     Parallel,
     Parameter,
@@ -21,8 +24,6 @@ from xb_muscle_ros.mechanisms.base import (
     ThickFilament,
     ThinFilament,
 )
-from xb_muscle_ros.mechanisms.extra import Extra, InSeries
-from xb_muscle_ros.mechanisms.ops import Expr
 
 GAMMA = Parameter(
     "gamma", "power strokes/L0", "half-sarcomere length in power strokes (1.3 µm / 10 nm)", 1.0, 1e4, 130.0,
@@ -61,6 +62,11 @@ class Model(ABC):
 
     @property
     @abstractmethod
+    def blocks(self) -> tuple[Mechanism, ...]:
+        """All blocks, in the order in which their states stand."""
+
+    @property
+    @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
         """Rows of the parameter table that this model needs, without repeats."""
 
@@ -77,6 +83,21 @@ class Model(ABC):
     def settling(self) -> Settling:
         """How a fibre is brought to rest."""
         return Representation.settling
+
+    def symbols(self, *further: str) -> dict[str, Any]:
+        """SymPy symbols of states, inputs and parameters, and of further names."""
+        import sympy
+
+        names = [*(s.name for s in (*self.states, *INPUTS)), *(p.name for p in self.parameters), *further]
+        return {name: sympy.Symbol(name, real=True) for name in names}
+
+    @abstractmethod
+    def evaluated(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Rates of the states and outputs, without smoothing, as the blocks' formulas give them with plain numbers.
+
+        Args:
+            values: of states, inputs and parameters, by name.
+        """
 
     @abstractmethod
     def equations(self, smooth: bool) -> Equations:
@@ -152,6 +173,12 @@ class Composition(Model):
     def in_series(self) -> InSeries | None:
         """The mechanism that puts another half-sarcomere in series, if there is one."""
         return next((extra for extra in self.extras if isinstance(extra, InSeries)), None)
+
+    def evaluated(self, values: Mapping[str, float]) -> dict[str, float]:
+        """See the base class."""
+        from xb_muscle_ros.models.assembly import evaluated
+
+        return evaluated(self, values)
 
     def equations(self, smooth: bool) -> Equations:
         """See the base class."""

@@ -12,7 +12,7 @@ from typing import Any
 
 import sympy
 
-from xb_muscle_ros.mechanisms.base import ExponentialRate, StepRate
+from xb_muscle_ros.mechanisms import ExponentialRate, StepRate
 from xb_muscle_ros.models.codegen import assignments, function, header, kernels, parameter_loads, used_symbols, vector
 from xb_muscle_ros.models.composition import INPUTS, Composition
 from xb_muscle_ros.models.grid_equations import SUMS, GridEquations, grid_equations

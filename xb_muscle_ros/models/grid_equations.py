@@ -9,10 +9,10 @@ from typing import Any
 import sympy
 
 from xb_muscle_ros.distribution.base import Ways
-from xb_muscle_ros.mechanisms.base import ExponentialRate, Parameter, Quantities, State, StrainRate
-from xb_muscle_ros.mechanisms.ops import Expr
-from xb_muscle_ros.models.assembly import output_expressions, rates, rest_of_states
-from xb_muscle_ros.models.composition import INPUTS, Composition
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.mechanisms import ExponentialRate, Expr, Parameter, Quantities, State, StrainRate
+from xb_muscle_ros.models.assembly import rates, rest_of_states
+from xb_muscle_ros.models.composition import Composition
 
 SUMS = ("q0", "q1", "q2", "kin0", "kin1", "kin2", "torn_off", "reattached")
 
@@ -50,10 +50,9 @@ def grid_equations(model: Composition, smooth: bool) -> GridEquations:
 
     Raises:
         AttributeError: a block asks for a quantity that no block provides.
-        ValueError: a strain dependence whose shape changes with the state, which a grid's tables cannot follow.
+        UserError: a strain dependence whose shape changes with the state, which a grid's tables cannot follow.
     """
-    names = [*(s.name for s in model.states), *(i.name for i in INPUTS), *(p.name for p in model.parameters), *SUMS]
-    symbols = {name: sympy.Symbol(name, real=True) for name in names}
+    symbols = model.symbols(*SUMS)
     q = Quantities(symbols, "composition", symbols["smoothing"] if smooth else None)
     parts = rates(model, q)
     fixed = {symbols[p.name] for p in model.parameters}
@@ -61,7 +60,10 @@ def grid_equations(model: Composition, smooth: bool) -> GridEquations:
         shape = (rate.slope,) if isinstance(rate, ExponentialRate) else (rate.threshold, rate.steepness)
         for expression in shape:
             if sympy.sympify(expression).free_symbols - fixed:
-                raise ValueError(f"model {model.name}: strain dependence {expression} must depend on parameters alone")
+                raise UserError(
+                    f"model {model.name}: strain dependence {expression} must depend on parameters alone on a strain "
+                    "grid; take method gaussian"
+                )
     derivatives = [*(parts.others[s.name] for s in model.states), parts.own_velocity]
     return GridEquations(
         states=model.states,
@@ -70,5 +72,5 @@ def grid_equations(model: Composition, smooth: bool) -> GridEquations:
         ways=parts.ways,
         derivatives=tuple(sympy.sympify(e) for e in derivatives),
         rest=tuple(sympy.sympify(e) for e in rest_of_states(model, symbols)),
-        outputs=tuple(sympy.sympify(e) for e in output_expressions(model, parts.q)),
+        outputs=tuple(sympy.sympify(e) for e in parts.outputs),
     )

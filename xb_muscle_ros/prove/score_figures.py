@@ -20,7 +20,7 @@ _FAMILIES = list(dict.fromkeys(FAMILY.values()))
 _IS_PHYSICS = {name.value for name in MECHANISMS}
 # Families side by side, faults behind.
 _NAMES = sorted(
-    (name.value for name in Name), key=lambda name: (name not in _IS_PHYSICS, _FAMILIES.index(FAMILY[Name(name)]))
+    (name.value for name in FAMILY), key=lambda name: (name not in _IS_PHYSICS, _FAMILIES.index(FAMILY[Name(name)]))
 )
 _TRUTHS = [*_NAMES, "outside", "null"]
 _ANSWERS = [*_NAMES, Verdict.UNEXPLAINED.value, Verdict.PARAMETERS.value, Verdict.NONE.value, "other"]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from xb_muscle_ros.diagnose.names import FAMILY, MECHANISMS, Name
+from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, MECHANISMS, Name
 from xb_muscle_ros.diagnose.result import Verdict
 
 PHYSICS = frozenset(name.value for name in MECHANISMS)
 FAMILIES_OF_PHYSICS = tuple(dict.fromkeys(FAMILY[name] for name in MECHANISMS))
-NAMES = frozenset(name.value for name in Name)
+NAMES = frozenset(name.value for name in (*MECHANISMS, *MEASUREMENT))
 NAMED = 0.5
 """Inclusion probability from which a component is named."""
 _MECHANISM, _ARTEFACT = "mechanism", "artefact"

@@ -13,6 +13,7 @@ from concurrent.futures import CancelledError
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from xb_muscle_ros import plugins
 from xb_muscle_ros.progress import Progress
 from xb_muscle_ros.work.backend import Function
 from xb_muscle_ros.work.identity import describe, environment
@@ -43,7 +44,7 @@ class Cluster:
         self._progress = progress
         self._quiet = quiet
         self._client = connect(address)
-        self._perform = performer()
+        self._perform, self._mechanisms = performer(), plugins.texts()
         self._name = f"xb_muscle-{uuid.uuid4().hex}"
         self._flying: dict[str, tuple[int, object, Future]] = {}
         self._finished: queue.SimpleQueue[Future] = queue.SimpleQueue()
@@ -66,7 +67,9 @@ class Cluster:
         key = f"{self._name}-{index}"
         # In bytes: Dask would look into a task for names of its own. And functions of a script go as what they are.
         payload = cloudpickle.dumps((self._function, task))
-        future = self._client.submit(self._perform, payload, environment(), key=key, pure=False, retries=_RETRIES)
+        future = self._client.submit(
+            self._perform, payload, environment(), self._mechanisms, key=key, pure=False, retries=_RETRIES
+        )
         self._flying[key] = index, task, future
         future.add_done_callback(self._finished.put)
 

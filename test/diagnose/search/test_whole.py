@@ -11,7 +11,7 @@ from written_out import Written, evaluated, some_states, with_ready_heads
 
 from xb_muscle_ros.diagnose.names import MECHANISMS, Name
 from xb_muscle_ros.diagnose.search.system import System
-from xb_muscle_ros.diagnose.search.whole import FRAMES, absent, beside, frame_of, only, whole
+from xb_muscle_ros.diagnose.search.whole import FRAMES, beside, frame_of, only, whole
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
@@ -122,14 +122,14 @@ def test_what_is_absent_is_the_null_of_the_catalogue() -> None:
         entry = CATALOGUE[name.value]
         if entry.effect is None and name is not Name.THICK_FILAMENT_COOPERATIVITY:
             assert name in FRAMES
-            assert absent(name) == {}
+            assert entry.absent == {}
         elif name is Name.THICK_FILAMENT_COOPERATIVITY:
-            assert absent(name) == {"J2": 0.0}
+            assert entry.absent == {"J2": 0.0}
         elif name is Name.FILAMENT_FRICTION:
             # Links that never slip: absent friction has no steps halved.
-            assert absent(name) == {"friction_force": 0.0, "friction_way": 1.0}
+            assert entry.absent == {"friction_force": 0.0, "friction_way": 1.0}
         else:
-            assert absent(name) == {entry.effect: 0.0}
+            assert entry.absent == {entry.effect: 0.0}
 
 
 def test_frames_and_mechanisms_that_a_model_has_are_not_beside_it() -> None:

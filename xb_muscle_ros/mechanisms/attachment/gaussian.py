@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Attachment, GaussianSpread, Parameter, Quantities
+from xb_muscle_ros.mechanisms import Attachment, GaussianSpread, Parameter, Quantities, ops
 
 F_RATE = Parameter("f", "1/s", "attachment rate, summed over strain", 0.0, 1e6, None, "van der Zee et al. 2026")
 WIDTH = Parameter(
@@ -28,5 +27,4 @@ class GaussianAttachment(Attachment):
     parameters = (F_RATE, WIDTH)
 
     def spread(self, q: Quantities) -> GaussianSpread:
-        """See the class."""
         return GaussianSpread(q.ready_heads * q.f * ops.positive(q.available_sites - q.q0), q.w)
