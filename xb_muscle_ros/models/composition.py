@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from xb_muscle_ros.distribution.base import Representation, Settling
 from xb_muscle_ros.distribution.gaussian import Gaussian
@@ -45,10 +45,25 @@ INPUTS = (
     State("velocity", "L0/s", "fibre velocity of the last step", -1e9, 1e9),
     State("calcium", "µM", "free calcium of the last step", 0.0, 1e6),
 )
-OUTPUTS = (
-    "force_f0", "force_ce_f0", "force_pe_f0", "ce_length_change_l0", "ce_velocity_l0_per_s",
-    "q0", "q1", "q2", "n_on", "drx", "r",
-)  # fmt: skip
+
+
+class Outputs(NamedTuple):
+    """What a fibre shows at one moment; forces in F0, lengths in L0, fractions of all heads or sites."""
+
+    force_f0: float
+    force_ce_f0: float
+    force_pe_f0: float
+    ce_length_change_l0: float
+    ce_velocity_l0_per_s: float
+    q0: float
+    q1: float
+    q2: float
+    n_on: float
+    drx: float
+    r: float
+
+
+OUTPUTS = Outputs._fields
 
 
 class Model(ABC):
@@ -160,7 +175,6 @@ class Composition(Model):
         return (*own, *(row for row, _ in other_states(self)))
 
     def state_rows(self, values: Mapping[str, float]) -> tuple[State, ...]:
-        """See the base class."""
         return self.representation.state_rows(self.states, values)
 
     @property
@@ -175,13 +189,11 @@ class Composition(Model):
         return next((extra for extra in self.extras if isinstance(extra, InSeries)), None)
 
     def evaluated(self, values: Mapping[str, float]) -> dict[str, float]:
-        """See the base class."""
         from xb_muscle_ros.models.assembly import evaluated
 
         return evaluated(self, values)
 
     def equations(self, smooth: bool) -> Equations:
-        """See the base class."""
         from xb_muscle_ros.models.assembly import equations
 
         return equations(self, smooth)

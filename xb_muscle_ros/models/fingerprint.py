@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import copy
 import functools
 import hashlib
 import sys
@@ -83,12 +84,11 @@ def _tree(file: Path) -> ast.Module:
     return ast.parse(file.read_text(encoding="utf-8"))
 
 
-@functools.cache
 def _code(name: str) -> str:
     """What a module computes: without comments, without its texts, and without what a catalogue says of its blocks."""
     file = _file(name)
     assert file is not None
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+    tree = copy.deepcopy(_tree(file))
     for node in ast.walk(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
             node.body = [line for line in node.body if not _is_said(line)] or [ast.Pass()]

@@ -87,7 +87,6 @@ class Hill(Model):
         return rates, balance.ce_velocity, shown
 
     def evaluated(self, values: Mapping[str, float]) -> dict[str, float]:
-        """See the base class."""
         rates, velocity, shown = self._written(values)
         return {**{f"rate of {name}": rate for name, rate in rates.items()}, "velocity": velocity, **shown}
 
