@@ -37,10 +37,10 @@ def equations(model: Composition, smooth: bool) -> Equations:
         parameters=model.parameters,
         symbols=symbols,
         shift=shift,
-        derivatives=tuple(sympy.sympify(e) for e in derivatives),
-        arrival=tuple(sympy.sympify(e) for e in (*moved, *(symbols[s.name] for s in model.states[3:]))),
-        rest=tuple(sympy.sympify(e) for e in (0, 0, 0, *rest_of_states(model, symbols))),
-        outputs=tuple(replaced(sympy.sympify(e), at_start) for e in parts.outputs),
+        derivatives=derivatives,
+        arrival=[*moved, *(symbols[s.name] for s in model.states[3:])],
+        rest=[0, 0, 0, *rest_of_states(model, symbols)],
+        outputs=[replaced(sympy.sympify(e), at_start) for e in parts.outputs],
         # The smooth form never divides by less than ln 2 / K heads.
         shares=() if smooth else ("q0", "q1", "q2"),
     )

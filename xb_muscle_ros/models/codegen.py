@@ -66,7 +66,7 @@ def moving(e: Equations) -> list[str]:
     return ["shift", "length_change"] if e.follows_length else ["shift"]
 
 
-def all_rates(e: Equations) -> tuple[Any, ...]:
+def all_rates(e: Equations) -> Sequence[Any]:
     """Rates of the states and of what moves beside them."""
     return e.derivatives if e.follows_length else e.derivatives[:-1]
 

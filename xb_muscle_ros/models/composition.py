@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -81,9 +81,9 @@ class Model(ABC):
         """All blocks, in the order in which their states stand."""
 
     @property
-    @abstractmethod
     def parameters(self) -> tuple[Parameter, ...]:
         """Rows of the parameter table that this model needs, without repeats."""
+        return distinct((*(p for block in self.blocks for p in block.parameters), *COMMON))
 
     @property
     @abstractmethod
@@ -164,9 +164,8 @@ class Composition(Model):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Rows of the parameter table that this model needs, without repeats."""
-        blocks = (p for block in self.blocks for p in block.parameters)
-        return distinct((*blocks, *COMMON, *self.representation.parameters))
+        """Those of the representation come last."""
+        return distinct((*super().parameters, *self.representation.parameters))
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -228,32 +227,50 @@ def other_states(model: Composition) -> list[tuple[State, str]]:
     return found
 
 
-@dataclass(frozen=True)
-class Equations:
+@dataclass(frozen=True, kw_only=True)
+class Written:
     """A model written out in symbols.
 
     Attributes:
-        states: integrated states, in the strain frame of the contractile element's present position.
+        states: those that are symbols.
         parameters: in the order of the parameter vector.
         symbols: the SymPy symbol of every state, input and parameter, by name.
-        shift: the symbol of the contractile element's movement within a step, power strokes.
-        derivatives: rates of the states in the frame that was fixed at the start of the step, then that of the
-            shift, then that of the length change. In the fixed frame the movement of the heads with the contractile
-            element is exact: only attachment and detachment change the moments.
-        arrival: the states in the frame of the end of the step, from those in the fixed frame and the shift.
+        derivatives: rates of the states, then that of the shift: the contractile element's movement within a step.
         rest: states of a fibre at rest without calcium.
-        outputs: values of `OUTPUTS`, at zero shift.
-        shares: names of moments that are divided by the first of them, and so must be right relative to it.
+        outputs: values of `OUTPUTS`.
     """
 
     states: tuple[State, ...]
     parameters: tuple[Parameter, ...]
     symbols: Mapping[str, Any]
+    derivatives: Sequence[Expr]
+    rest: Sequence[Expr]
+    outputs: Sequence[Expr]
+
+    def __post_init__(self) -> None:
+        """Make plain numbers among the expressions SymPy's."""
+        import sympy
+
+        for name in ("derivatives", "rest", "outputs"):
+            object.__setattr__(self, name, tuple(sympy.sympify(e) for e in getattr(self, name)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equations(Written):
+    """A model whose every state is a symbol, in the strain frame of the contractile element's present position.
+
+    Rates are those in the frame that was fixed at the start of the step; behind that of the shift stands that of the
+    length change. In the fixed frame the movement of the heads with the contractile element is exact: only attachment
+    and detachment change the moments. Outputs are those at zero shift.
+
+    Attributes:
+        shift: the symbol of the contractile element's movement within a step, power strokes.
+        arrival: the states in the frame of the end of the step, from those in the fixed frame and the shift.
+        shares: names of moments that are divided by the first of them, and so must be right relative to it.
+    """
+
     shift: Any
-    derivatives: tuple[Expr, ...]
-    arrival: tuple[Expr, ...]
-    rest: tuple[Expr, ...]
-    outputs: tuple[Expr, ...]
+    arrival: Sequence[Expr]
     shares: tuple[str, ...] = ()
 
     @property

@@ -56,17 +56,14 @@ def _collect(name: str, found: dict[str, None]) -> None:
         if isinstance(node, ast.Import):
             imported = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            whole = resolve_name("." * node.level + (node.module or ""), _package_of(name))
+            package = str(sys.modules[name].__package__ or "")
+            whole = resolve_name("." * node.level + (node.module or ""), package)
             imported = [whole, *(f"{whole}.{alias.name}" for alias in node.names)]
         else:
             continue
         for other in imported:
             if other.partition(".")[0] == name.partition(".")[0] or not _is_library(other):
                 _collect(other, found)
-
-
-def _package_of(name: str) -> str:
-    return str(sys.modules[name].__package__ or "")
 
 
 def _file(name: str) -> Path | None:
@@ -91,14 +88,12 @@ def _code(name: str) -> str:
     tree = copy.deepcopy(_tree(file))
     for node in ast.walk(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
-            node.body = [line for line in node.body if not _is_said(line)] or [ast.Pass()]
+            node.body = [line for line in node.body if not _only_says(line)]
     return ast.dump(tree)
 
 
-def _is_said(line: ast.stmt) -> bool:
+def _only_says(line: ast.stmt) -> bool:
     match line:
-        case ast.Expr(value=ast.Constant(value=str())):
-            return True
-        case ast.Assign(targets=[ast.Name(id="entry")], value=ast.Call()):
+        case ast.Expr(value=ast.Constant(value=str())) | ast.Assign(targets=[ast.Name(id="entry")], value=ast.Call()):
             return True
     return False

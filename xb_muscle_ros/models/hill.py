@@ -13,12 +13,11 @@ from xb_muscle_ros.mechanisms import (
     ForceVelocity,
     Mechanism,
     Parallel,
-    Parameter,
     Quantities,
     Series,
     State,
 )
-from xb_muscle_ros.models.composition import COMMON, OUTPUTS, Equations, Model, distinct
+from xb_muscle_ros.models.composition import OUTPUTS, Equations, Model
 
 
 @dataclass(frozen=True)
@@ -41,11 +40,6 @@ class Hill(Model):
     def blocks(self) -> tuple[Mechanism, ...]:
         """All blocks, in the order in which their states stand."""
         return (self.activation, self.force_velocity, self.series, self.parallel, *self.extras)
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Rows of the parameter table that this model needs, without repeats."""
-        return distinct((*(p for block in self.blocks for p in block.parameters), *COMMON))
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -99,16 +93,15 @@ class Hill(Model):
         rest: dict[str, Expr] = {}
         for block in self.blocks:
             rest.update(block.rest(Quantities(symbols, block.name, None)))
-        moving = (*(rates[s.name] for s in self.states), velocity, symbols["velocity"])
         return Equations(
             states=self.states,
             parameters=self.parameters,
             symbols=symbols,
             shift=sympy.Symbol("shift", real=True),
-            derivatives=tuple(sympy.sympify(e) for e in moving),
-            arrival=tuple(symbols[s.name] for s in self.states),
-            rest=tuple(sympy.sympify(rest.get(s.name, 0)) for s in self.states),
-            outputs=tuple(sympy.sympify(shown.get(name, 0)) for name in OUTPUTS),
+            derivatives=[*(rates[s.name] for s in self.states), velocity, symbols["velocity"]],
+            arrival=[symbols[s.name] for s in self.states],
+            rest=[rest.get(s.name, 0) for s in self.states],
+            outputs=[shown.get(name, 0) for name in OUTPUTS],
         )
 
     def module_text(self, smooth: bool) -> str:

@@ -6,14 +6,9 @@ from xb_muscle_ros.mechanisms import Attachment, GaussianSpread, Parameter, Quan
 
 F_RATE = Parameter("f", "1/s", "attachment rate, summed over strain", 0.0, 1e6, None, "van der Zee et al. 2026")
 WIDTH = Parameter(
-    "w",
-    "power strokes",
-    "standard deviation of the strain at attachment (paper 0.3, released sets 1/6)",
-    1e-3,
-    5.0,
-    0.3,
-    "van der Zee et al. 2026",
-)
+    "w", "power strokes", "standard deviation of the strain at attachment (paper 0.3, released sets 1/6)", 1e-3, 5.0,
+    0.3, "van der Zee et al. 2026",
+)  # fmt: skip
 
 
 class GaussianAttachment(Attachment):

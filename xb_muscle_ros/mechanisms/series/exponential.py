@@ -14,14 +14,10 @@ KSE0 = Parameter(
 
 EXTENSION = State("l_se", "power strokes", "length of the series element beyond slack", -1e5, 1e5)
 SMOOTH_STIFFNESS = Parameter(
-    "smooth_stiffness",
-    "1",
-    "1 where the released set also smoothed the heads' stiffness in the velocity constraint (v3), 0 where not",
-    0.0,
-    1.0,
-    0.0,
-    "as released",
-)
+    "smooth_stiffness", "1",
+    "1 where the released set also smoothed the heads' stiffness in the velocity constraint (v3), 0 where not", 0.0,
+    1.0, 0.0, "as released",
+)  # fmt: skip
 
 
 class ExponentialSeries(Series):
