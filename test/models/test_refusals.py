@@ -12,8 +12,8 @@ import pytest
 from xb_muscle_ros.distribution.gaussian import Gaussian
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.mechanisms import Entry, Extra, Needs, Parameter, State, ThinFilament, Values
-from xb_muscle_ros.models import checking, compiled
-from xb_muscle_ros.models.registry import BLOCKS, MODELS
+from xb_muscle_ros.models import checking, compiled, registry
+from xb_muscle_ros.models.registry import BLOCKS, MODELS, SWAPS
 
 DRAG = Parameter("own_drag", "F0 s/L0", "drag", 0.0, 10.0, 0.0, "this test")
 ENTRY = Entry("own_family", "own drag", "a drag", "own_drag", 0.02, starts=({"own_drag": 0.01},))
@@ -117,6 +117,21 @@ def test_what_is_incomplete_or_in_the_way_is_refused(what: str) -> None:
 
 def test_a_hook_that_is_missing_is_named() -> None:
     assert "hook 'available_sites' of its family is missing" in refused(made(ThinFilament))
+
+
+def test_a_block_in_another_one_s_place_is_a_frame() -> None:
+    members = {
+        "available_sites": lambda self, q: 1.0,
+        "entry": entry(effect=None, starts=({"own_drag": 1.0},), shape={"own_drag": 1.0}, off={"own_drag": 0.0}),
+    }
+    assert "it takes another block's place" in refused(made(ThinFilament, **members))
+
+
+def test_two_mechanisms_in_one_place_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    other = type("Other", (SWAPS["thin_filament_cooperativity"],), {"name": "other_cooperativity"})
+    monkeypatch.setattr(registry, "SWAPS", {**SWAPS, "other_cooperativity": other})
+    with pytest.raises(UserError, match="'thin_filament_cooperativity' and 'other_cooperativity' take the same place"):
+        registry.row_of("2state+thin_filament_cooperativity+other_cooperativity")
 
 
 def formula(value: Any) -> dict[str, Any]:

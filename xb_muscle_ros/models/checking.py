@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from xb_muscle_ros.distribution.grid import BINS, RANGE, REGRID
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.mechanisms import Entry, Extra, Family, Needs, Parameter, Quantities, State
-from xb_muscle_ros.mechanisms.discovery import Block, place
+from xb_muscle_ros.mechanisms.discovery import Block, is_outside, place
 from xb_muscle_ros.models.composition import COMMON, Model
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
@@ -124,6 +124,8 @@ def _amiss(block: Block, entry: Entry, table: Mapping[str, Parameter]) -> Iterat
         row = own[entry.effect]
         if not row.lower <= 0.0 < row.upper or row.default != 0.0:
             yield f"its effect '{row.name}' must have 0 as its default and within its bounds: there it is absent"
+    if block.family is not Family.EXTRA and is_outside(block) and not entry.frame:
+        yield "it takes another block's place, so that a diagnosis needs a model of its own for it; say frame=True"
     if entry.effect is None and not entry.off and not entry.frame:
         yield "nothing says where it is absent; name its effect, or say frame=True where no value leaves it absent"
     if block.family is Family.EXTRA and entry.effect is None:

@@ -18,7 +18,7 @@ from xb_muscle_ros.distribution.base import Representation
 from xb_muscle_ros.distribution.gaussian import Gaussian
 from xb_muscle_ros.distribution.grid import Characteristics, ConservativeFixedGrid, FixedGrid
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.mechanisms import Extra, Mechanism, Needs, discovery
+from xb_muscle_ros.mechanisms import Extra, InSeries, Mechanism, Needs, discovery
 from xb_muscle_ros.models import checking
 from xb_muscle_ros.models.composition import Composition, Model
 from xb_muscle_ros.models.hill import Hill
@@ -125,6 +125,13 @@ BASE_OF: Mapping[str, str] = MappingProxyType({name: base for name, base, _ in _
 """Model whose parameter set a model can use: itself, or the one that it is a variant of."""
 
 
+def place_of(mechanism: str) -> str:
+    """What only one mechanism of a model can take: a family's place, or that in series; empty: none."""
+    if mechanism in SWAPS:
+        return SWAPS[mechanism].family.value
+    return "in series" if issubclass(EXTRAS[mechanism], InSeries) else ""
+
+
 def _with_mechanism(row: Row, name: str, taken: dict[str, str], where: str) -> Row:
     """A row with one more mechanism.
 
@@ -137,6 +144,7 @@ def _with_mechanism(row: Row, name: str, taken: dict[str, str], where: str) -> R
             raise UserError(f"{where}: mechanism '{name}' is named twice; name it once")
         if extra.needs not in row.has:
             raise UserError(f"{where}: mechanism '{name}' needs {extra.needs.value}, which this model does not have")
+        _take(place_of(name), name, taken, where)
         return replace(row, extras=(*row.extras, extra))
     if name not in SWAPS:
         raise UserError(f"{where}: mechanism '{name}' is not known{suggest(name, (*EXTRAS, *SWAPS))}")
@@ -147,10 +155,14 @@ def _with_mechanism(row: Row, name: str, taken: dict[str, str], where: str) -> R
         raise UserError(f"{where}: mechanism '{name}' needs {needed}, which this model does not have")
     if row.blocks[slot] is block:
         raise UserError(f"{where}: mechanism '{name}' is part of this model already; leave it out")
-    if slot in taken:
-        raise UserError(f"{where}: mechanisms '{taken[slot]}' and '{name}' take the same block's place; name one")
-    taken[slot] = name
+    _take(place_of(name), name, taken, where)
     return row.with_block(block)
+
+
+def _take(place: str, name: str, taken: dict[str, str], where: str) -> None:
+    if place and place in taken:
+        raise UserError(f"{where}: mechanisms '{taken[place]}' and '{name}' take the same place; name one of them")
+    taken[place] = name
 
 
 @functools.cache

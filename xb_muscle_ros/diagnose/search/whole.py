@@ -19,7 +19,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.parameters import complete
-from xb_muscle_ros.models.registry import SWAPS, compose, model_of_set, row_of, with_mechanisms
+from xb_muscle_ros.models.registry import compose, model_of_set, place_of, row_of, with_mechanisms
 
 FRAMES = tuple(Name(name) for name, entry in CATALOGUE.items() if entry.frame)
 """Mechanisms that are another model rather than a value."""
@@ -40,9 +40,9 @@ def _goes(model: str, names: tuple[Name, ...]) -> bool:
 
 
 def together(names: Iterable[Name]) -> bool:
-    """Whether no two of some names take the place of the same block."""
-    slots = [SWAPS[name].family for name in set(names) if name in SWAPS]
-    return len(slots) == len(set(slots))
+    """Whether no two of some names take the same place in a model."""
+    places = [place for name in set(names) if name in CATALOGUE and (place := place_of(name))]
+    return len(places) == len(set(places))
 
 
 def frame_of(names: Iterable[Name]) -> tuple[Name, ...]:
