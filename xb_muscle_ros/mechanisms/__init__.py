@@ -13,7 +13,7 @@ from xb_muscle_ros.mechanisms.base import (
     Values,
 )
 from xb_muscle_ros.mechanisms.entry import Entry, Starts
-from xb_muscle_ros.mechanisms.extra import Chain, Extra, HeadMoments, InSeries, Needs, Unit
+from xb_muscle_ros.mechanisms.extra import Chain, Extra, InSeries, Moments, Needs, Unit
 from xb_muscle_ros.mechanisms.families import (
     Activation,
     Attachment,
@@ -31,7 +31,7 @@ from xb_muscle_ros.mechanisms.quantities import Quantities
 
 __all__ = [
     "Activation", "Attachment", "Balance", "Chain", "Contractile", "Detachment", "Entry", "ExponentialRate", "Expr",
-    "Extra", "Family", "ForceVelocity", "GaussianSpread", "HeadMoments", "InSeries", "Mechanism", "Needs", "Parallel",
+    "Extra", "Family", "ForceVelocity", "GaussianSpread", "InSeries", "Mechanism", "Moments", "Needs", "Parallel",
     "Parameter", "Quantities", "Series", "Starts", "State", "StepRate", "StrainRate", "ThickFilament", "ThinFilament",
     "Unit", "Values", "ops",
 ]  # fmt: skip

@@ -20,12 +20,16 @@ class Needs(enum.Enum):
     SUPER_RELAXED = "super-relaxed heads"
 
 
-class HeadMoments(NamedTuple):
-    """Zeroth to second moment over strain of heads, or of heads per second."""
+class Moments(NamedTuple):
+    """Zeroth to second moment over strain: of heads, or of a flux of heads (1/s)."""
 
     m0: Expr
     m1: Expr
     m2: Expr
+
+    def plus(self, other: Moments, sign: int = 1) -> Moments:
+        """Sum, or difference with sign -1."""
+        return Moments(self.m0 + sign * other.m0, self.m1 + sign * other.m1, self.m2 + sign * other.m2)
 
 
 class Extra(Mechanism):
@@ -62,7 +66,7 @@ class Extra(Mechanism):
         """Further rates at which attached heads detach to the ready state."""
         return ()
 
-    def head_force(self, q: Quantities, m: HeadMoments) -> Expr:
+    def head_force(self, q: Quantities, m: Moments) -> Expr:
         """What heads bear beyond Q0 + Q1, from their moments; linear in these, so that rates may stand for heads."""
         return 0
 

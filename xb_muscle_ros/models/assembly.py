@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from xb_muscle_ros.distribution.base import Moments, Representation, Ways
+from xb_muscle_ros.distribution.base import Representation, Ways
 from xb_muscle_ros.distribution.gaussian import Gaussian
-from xb_muscle_ros.mechanisms import Chain, Expr, Extra, HeadMoments, Quantities, Unit, ops
+from xb_muscle_ros.mechanisms import Chain, Expr, Extra, Moments, Quantities, Unit, ops
 from xb_muscle_ros.models.composition import OUTPUTS, Composition, Equations, other_states
 
 
@@ -156,13 +156,13 @@ def _sarcomere_change(model: Composition, q: Quantities) -> Expr:
     return q.length_change - extension / q.gamma
 
 
-def _borne(model: Composition, q: Quantities, m: HeadMoments) -> Expr:
+def _borne(model: Composition, q: Quantities, m: Moments) -> Expr:
     """What heads bear, power-stroke units; rates may stand for heads."""
     return m.m0 + m.m1 + sum(extra.head_force(q.for_block(extra.name), m) for extra in model.extras)
 
 
-def _moments(q: Quantities) -> HeadMoments:
-    return HeadMoments(q.q0, q.q1, q.q2)
+def _moments(q: Quantities) -> Moments:
+    return Moments(q.q0, q.q1, q.q2)
 
 
 def _heads(model: Composition, representation: Representation, q: Quantities) -> _Heads:
@@ -192,11 +192,11 @@ def _heads(model: Composition, representation: Representation, q: Quantities) ->
     net = kinetics.m0 + torn - back
     others.update(thick.derivatives(q.for_block(thick.name, attachment_rate_net=net)))
     # Strain grows by one power stroke with every power stroke of movement: Q1 by Q0, Q2 by 2 Q1.
-    stiffness = _borne(model, q, HeadMoments(0, q.q0, 2 * q.q1))
+    stiffness = _borne(model, q, Moments(0, q.q0, 2 * q.q1))
     if stiffness != q.q0:
         # Heads whose force bends lose their stiffness where they are compressed far: it does not go below zero.
         stiffness = ops.positive(stiffness)
-    unit = Unit(q.force_xb, _borne(model, q, HeadMoments(*kinetics)), stiffness)
+    unit = Unit(q.force_xb, _borne(model, q, kinetics), stiffness)
     return _Heads(q, kinetics, ways, others, unit)
 
 

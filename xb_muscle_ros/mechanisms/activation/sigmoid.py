@@ -1,7 +1,5 @@
 """Activation by calcium without delay, as in the paper's Hill-type models."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Activation, Expr, Parameter, Quantities, ops
 from xb_muscle_ros.mechanisms.thin_filament.sigmoid import HILL_N, KAPPA
 

@@ -1,7 +1,5 @@
 """Attachment around the power stroke with the spread of the head's Brownian motion."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Attachment, GaussianSpread, Parameter, Quantities, ops
 
 F_RATE = Parameter("f", "1/s", "attachment rate, summed over strain", 0.0, 1e6, None, "van der Zee et al. 2026")

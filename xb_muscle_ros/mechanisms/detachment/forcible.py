@@ -1,7 +1,5 @@
 """Regular detachment, and heads that are torn off when stretched far: the fourth state."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import (
     Entry,
     Expr,

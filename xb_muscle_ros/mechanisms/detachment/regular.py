@@ -1,7 +1,5 @@
 """Detachment by two exponentials of strain: slow at the power stroke, faster to either side."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from xb_muscle_ros.mechanisms import Detachment, ExponentialRate, Parameter, Quantities, StrainRate

@@ -1,7 +1,5 @@
 """Active titin: it takes hold of actin when calcium comes, and is a spring from there on."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Parameter, Quantities, State, Values
 
 _SOURCE = "Millard, Franklin and Herzog 2024; this package"

@@ -1,7 +1,5 @@
 """Friction that bound heads make: links are elastic for a short way, slip, and take time to form anew."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Needs, Parameter, Quantities, State, Values
 
 _SOURCE = (

@@ -1,7 +1,5 @@
 """Filament overlap: how many of the available sites heads can reach depends on length."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Parameter, Quantities, ops
 
 OVERLAP = Parameter(

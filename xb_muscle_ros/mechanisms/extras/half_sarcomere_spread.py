@@ -1,7 +1,5 @@
 """Half-sarcomere spread: a stronger and a weaker half-sarcomere in series, which move against each other."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Chain, Entry, Expr, InSeries, Parameter, Quantities, State, Unit, Values
 
 _SOURCE = "Campbell et al. 2011; this package"

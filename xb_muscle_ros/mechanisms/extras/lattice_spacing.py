@@ -1,7 +1,5 @@
 """Lattice spacing: heads reach actin more easily where filaments lie closer, as they do in a longer fibre."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Entry, Extra, Needs, Parameter, Quantities, Values, ops
 
 LATTICE = Parameter(

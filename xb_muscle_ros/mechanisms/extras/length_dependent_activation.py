@@ -1,7 +1,5 @@
 """Length-dependent activation: a longer fibre is more sensitive to calcium."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Entry, Extra, Parameter, Quantities, Values, ops
 
 SENSITIVITY = Parameter(

@@ -1,7 +1,5 @@
 """Passive viscoelasticity: springs that forget, as titin's unfolding domains make them."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Parameter, Quantities, State, Values
 
 _SOURCE = "Minajeva et al. 2001; this package"

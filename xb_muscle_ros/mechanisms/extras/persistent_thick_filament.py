@@ -1,7 +1,5 @@
 """Persistent thick filament: it switches more slowly than force does, on and off."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Entry, Extra, Needs, Parameter, Quantities, Values, ops
 
 PERSISTENCE = Parameter(

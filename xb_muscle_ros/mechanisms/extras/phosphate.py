@@ -1,7 +1,5 @@
 """Phosphate: heads detach by reversing the power stroke."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Entry, ExponentialRate, Extra, Needs, Parameter, Quantities, StrainRate
 
 REVERSAL = Parameter(

@@ -1,7 +1,5 @@
 """Static stiffness: a spring that calcium, not force, makes stiff."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Parameter, Quantities
 
 _SOURCE = "Bagni et al. 1994; this package"

@@ -1,7 +1,5 @@
 """Strain recruits heads: stretch of the thick filament brings super-relaxed heads into play, beside force."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Entry, Extra, Needs, Parameter, Quantities, Values
 
 RECRUITMENT = Parameter(

@@ -1,7 +1,5 @@
 """Temperature: all rates faster or slower together."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Entry, Extra, Parameter, Quantities, Values
 
 _SOURCE = "Ranatunga 1996; this package"

@@ -1,7 +1,5 @@
 """Viscous drag: a force proportional to the fibre's velocity."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Parameter, Quantities
 
 DRAG = Parameter("drag", "F0 s/L0", "viscous drag of the fibre", 0.0, 10.0, 0.0, "Ford, Huxley and Simmons 1977")

@@ -1,7 +1,5 @@
 """Weakly bound heads: a population that attaches and detaches fast and resists movement while it is attached."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Needs, Parameter, Quantities, State, Values
 
 _SOURCE = "Brenner et al. 1982; this package"

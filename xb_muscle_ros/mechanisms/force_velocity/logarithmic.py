@@ -1,7 +1,5 @@
 """The continuously differentiable force-velocity relation of De Groote et al. 2016."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Expr, ForceVelocity, Parameter, Quantities, ops
 
 _SOURCE = "De Groote et al. 2016"

@@ -1,7 +1,5 @@
 """Parallel spring of the released sets: linear above rest, with a constant offset."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Expr, Parallel, Parameter, Quantities, ops
 
 KPE = Parameter("kpe", "F0/power stroke", "stiffness of the parallel spring", 0.0, 10.0, 0.0, "van der Zee et al. 2026")

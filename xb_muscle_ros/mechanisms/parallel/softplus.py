@@ -1,7 +1,5 @@
 """Parallel spring of the paper: linear above its resting length, with a smooth transition."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Expr, Parallel, Parameter, Quantities, ops
 from xb_muscle_ros.mechanisms.parallel.linear import KPE
 

@@ -1,7 +1,5 @@
 """Exponential series spring."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from xb_muscle_ros.mechanisms import Balance, Contractile, Entry, Expr, Parameter, Quantities, Series, State, ops

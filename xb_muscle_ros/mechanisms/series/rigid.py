@@ -1,7 +1,5 @@
 """No series compliance: the contractile element takes the whole length change."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Balance, Contractile, Expr, Quantities, Series
 
 

@@ -1,7 +1,5 @@
 """Exponential series spring that goes slack: a tension element, which does not push."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Expr, Quantities, Values, ops
 from xb_muscle_ros.mechanisms.series.exponential import EXTENSION, KSE, KSE0, ExponentialSeries
 

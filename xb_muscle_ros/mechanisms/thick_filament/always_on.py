@@ -1,7 +1,5 @@
 """Thick filament without regulation: every head that is not attached can attach."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Expr, Quantities, ThickFilament
 
 

@@ -1,7 +1,5 @@
 """Cooperative thick filament: force brings super-relaxed heads into play."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from xb_muscle_ros.mechanisms import Entry, Expr, Parameter, Quantities, Starts, State, ThickFilament, Values

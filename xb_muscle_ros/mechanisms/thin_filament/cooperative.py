@@ -1,7 +1,5 @@
 """Cooperative thin filament: active sites and bound heads help their neighbours to switch on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from xb_muscle_ros.mechanisms import Entry, Expr, Parameter, Quantities, Starts, State, ThinFilament, Values

@@ -1,7 +1,5 @@
 """Thin filament without cooperativity: a sigmoid of calcium, reached with a short lag."""
 
-from __future__ import annotations
-
 from xb_muscle_ros.mechanisms import Expr, Parameter, Quantities, ThinFilament, Values
 from xb_muscle_ros.mechanisms.thin_filament.cooperative import N_ON
 
