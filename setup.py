@@ -23,7 +23,7 @@ setup(
     package_data={
         NAME: ["py.typed"],
         f"{NAME}.bench": ["*.c"],
-        f"{NAME}.diagnose.report": ["*.css", "templates/*.j2"],
+        f"{NAME}.diagnose.report": ["*.css", "*.yaml", "templates/*.j2"],
         f"{NAME}.plant": ["*.xml"],
     },
     data_files=[

@@ -1,7 +1,7 @@
-"""Diagnose real recordings: what differs, what explains it, and how well that predicts trials that were concealed.
+"""Diagnose real recordings: what differs, what explains it, and how well that predicts held-out trials.
 
 For each case (see `recorded_cases`) the recordings are imported, the trials that are shown are diagnosed, and the
-concealed ones are predicted by the base and by the answer's augmented fibre. Cases can be run one by one: one that is
+held-out ones are predicted by the base and by the answer's augmented fibre. Cases can be run one by one: one that is
 done is kept, one that was interrupted goes on from its journal. Each leaves in <out>/<case> what `xb_muscle diagnose`
 writes, `start*.yaml` and `base*.yaml` (where the model started, and the fitted base) and `predictions.json`. Figures go
 to --images, the page to --page; sections of cases that are not in <out> stay as they are on the page.
@@ -28,8 +28,7 @@ from xb_muscle_ros.cli.common import add_work, work_options_of
 from xb_muscle_ros.diagnose.effort import QUICK, Effort
 from xb_muscle_ros.diagnose.feature_tables import read_features
 from xb_muscle_ros.diagnose.intake import FibreStudy
-from xb_muscle_ros.diagnose.outputs import write
-from xb_muscle_ros.diagnose.report import output
+from xb_muscle_ros.diagnose.outputs import JSON, read, write
 from xb_muscle_ros.diagnose.result import Diagnosis
 from xb_muscle_ros.diagnose.run import diagnose
 from xb_muscle_ros.errors import UserError
@@ -79,7 +78,7 @@ def main() -> int:
             failed += 1
     done = [(c, given.out / c.key) for c in CASES.values() if (given.out / c.key / "predictions.json").exists()]
     for case, folder in done:
-        if not case.pooled or case.concealed:
+        if not case.pooled or case.heldout:
             print(write_figure(folder, given.images / f"recorded_{case.key}.png"))
     page = write_page(done, os.path.relpath(given.images, given.page.parent), _text(given.page))
     write_text(given.page, page)
@@ -100,7 +99,7 @@ def _text(path: Path) -> str:
 
 def forget(folder: Path) -> None:
     """Remove what a case found, and its journal; its bags stay."""
-    for name in (output.JSON, "predictions.json", "journal.jsonl"):
+    for name in (JSON, "predictions.json", "journal.jsonl"):
         (folder / name).unlink(missing_ok=True)
 
 
@@ -113,22 +112,22 @@ def run_case(
         UserError: recordings are absent or cannot be read, or none of them are those of the case.
     """
     trials = imported(case, recordings, folder / "bags")
-    shown, concealed = chosen(trials, case.shown), {n: chosen(trials, p) for n, p in case.concealed.items()}
-    absent = [p for p in (*case.shown, *sum(case.concealed.values(), ())) if not chosen(trials, [p])]
+    shown, heldout = chosen(trials, case.shown), {n: chosen(trials, p) for n, p in case.heldout.items()}
+    absent = [p for p in (*case.shown, *sum(case.heldout.values(), ())) if not chosen(trials, [p])]
     if absent:
         raise UserError(f"no recording of {', '.join(absent)}; name all folders of recordings with --recordings")
-    if not (folder / output.JSON).exists():
+    if not (folder / JSON).exists():
         diagnose_shown(case, shown, features, folder, quick, replace(options, journal=folder / "journal.jsonl"))
-    d = output.read(folder)
+    d = read(folder)
     bases = [base_fibre(load_fibre(folder / _file("start", name, d)), d) for name in d.fibres]
     for base in bases:
         write_fibre(folder / _file("base", base.name, d), base, ["The base of the diagnosis beside it, as fitted."])
-    rows, arrays = predictions(d, folder, bases, concealed, case.alike)
+    rows, arrays = predictions(d, folder, bases, heldout, case.alike)
     for row in rows:
         row["warned"] = warned_beforehand(d, row["fibre"])
     with replaced(folder / "predictions.npz") as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)
-    write_text(folder / "predictions.json", json.dumps({"case": case.key, "concealed": rows}, indent=1) + "\n")
+    write_text(folder / "predictions.json", json.dumps({"case": case.key, "heldout": rows}, indent=1) + "\n")
 
 
 def _file(kind: str, fibre: str, d: Diagnosis) -> str:

@@ -24,7 +24,7 @@ from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.report import as_json
 from xb_muscle_ros.fit.run import Settings, fit
-from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY, Scope
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS, ORDINARY, Scope
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.simulation.made import made
@@ -113,8 +113,8 @@ def case(task: dict[str, Any]) -> dict[str, Any]:
 
 def _with_errors(trials: list[Trial], muscle: Muscle, random: np.random.Generator, substeps: int) -> list[Trial]:
     """The trials made anew, with ordinary errors of the measurement drawn from their priors."""
-    study = {n: FAULTS[n].sd * random.normal() for n in ORDINARY if FAULTS[n].scope is Scope.STUDY}
-    shifts = {t.facts.pca: FAULTS["pca_shift"].sd * random.normal() for t in trials}
+    study = {n: ARTEFACTS[n].sd * random.normal() for n in ORDINARY if ARTEFACTS[n].scope is Scope.STUDY}
+    shifts = {t.facts.pca: ARTEFACTS["pca_shift"].sd * random.normal() for t in trials}
     anew = []
     for order, trial in enumerate(trials):
         given = replace(trial, force_time_s=np.empty(0), force_n=np.empty(0))
@@ -122,7 +122,7 @@ def _with_errors(trials: list[Trial], muscle: Muscle, random: np.random.Generato
         errors = {**study, "run_down": 0.0, "pca_shift": shifts[trial.facts.pca]}
         found = made(muscle, given, random, substeps=substeps, **errors)
         left = (1.0 - study["run_down"]) ** order
-        offset = FAULTS["force_offset"].sd * random.normal()
+        offset = ARTEFACTS["force_offset"].sd * random.normal()
         anew.append(replace(found, force_n=left * found.force_n + offset * found.facts.f0_n))
     return anew
 

@@ -20,7 +20,7 @@ from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.features import F0_ANCHOR
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.run import Settings, fit
-from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS, ORDINARY
 from xb_muscle_ros.models.fibre_file import changed, load_fibre
 from xb_muscle_ros.trials.bags import find_bags, read_trial
 from xb_muscle_ros.trials.trial import Trial
@@ -50,7 +50,7 @@ def hill_shifts(table: Path) -> None:
 
         def left(z: np.ndarray, pca: np.ndarray = pca, mean: np.ndarray = mean) -> np.ndarray:
             force, slope = parts(z, pca)
-            distance: np.ndarray = (mean - force) / np.hypot(FORCE_SD_F0, FAULTS["pca_shift"].sd * slope)
+            distance: np.ndarray = (mean - force) / np.hypot(FORCE_SD_F0, ARTEFACTS["pca_shift"].sd * slope)
             return distance
 
         found = least_squares(left, [6.2, 3.0, 1.0, 0.01]).x
@@ -80,7 +80,7 @@ def fitted(folder: str, fibre: str, model: str) -> None:
     start = changed(load_fibre(fibre, model), {"smoothing": 0.0}, "ordinary errors")
     prepared = fit_trials(trials, [False] * len(trials))
     coordinates = parameter_coordinates(start, None, (), {}, {})
-    wide = {name: WIDER * FAULTS[name].sd for name in ORDINARY}
+    wide = {name: WIDER * ARTEFACTS[name].sd for name in ORDINARY}
     coordinates += fault_coordinates(ORDINARY, [t.name for t in prepared], [t.solution for t in prepared], wide)
     problem = Problem(start, prepared, coordinates, {}, (F0_ANCHOR,))
     found = fit(problem, Settings(starts=2, level=None), Options(processes=0, quiet=True))
@@ -88,7 +88,7 @@ def fitted(folder: str, fibre: str, model: str) -> None:
     print(f"{folder}, {model}: {100.0 * found.best.rmsd_f0:.2f} % F0")
     for c, z, sd in zip(problem.coordinates, found.best.z, sds, strict=True):
         if c.group is not None:
-            print(f"  {c.label:50s} {z:+.4g} ± {sd:.2g} {FAULTS[c.name].unit}")
+            print(f"  {c.label:50s} {z:+.4g} ± {sd:.2g} {ARTEFACTS[c.name].unit}")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
-"""Concealed trials as two fibre files predict them: the fitted base, and the answer's augmented fibre.
+"""Held-out trials as two fibre files predict them: the fitted base, and the answer's augmented fibre.
 
-A prediction has nothing of the concealed trial but what its own force tells before anything moves: its solution's pCa
+A prediction has nothing of the held-out trial but what its own force tells before anything moves: its solution's pCa
 shift and its force offset (`fit.calibration`). Measurement errors that a study shares (time shift, length gain) are
-taken as the study has them where concealed trials were recorded as the shown ones were, and have no part elsewhere.
+taken as the study has them where held-out trials were recorded as the shown ones were, and have no part elsewhere.
 """
 
 from __future__ import annotations
@@ -60,27 +60,27 @@ def predicted(fibre: Fibre, trial: FitTrial, shared: Mapping[str, float]) -> Cal
 
 def shared_errors(d: Diagnosis, fibre: str, model: str) -> dict[str, float]:
     """Errors that all recordings of a fibre share, by name, with one of the models ``before`` and ``after``."""
-    own = [row for row in d.nuisances if row.fibre == fibre and row.name in _SHARED]
+    own = [row for row in d.nuisance_parameters if row.fibre == fibre and row.name in _SHARED]
     return {row.name: (row.before or 0.0) if model == "before" else row.value for row in own}
 
 
 def predictions(
-    d: Diagnosis, folder: Path, bases: Sequence[Fibre], concealed: Mapping[str, Sequence[Trial]], alike: bool
+    d: Diagnosis, folder: Path, bases: Sequence[Fibre], heldout: Mapping[str, Sequence[Trial]], alike: bool
 ) -> tuple[list[dict[str, Any]], dict[str, Array]]:
-    """A row for every concealed trial, and its forces.
+    """A row for every held-out trial, and its forces.
 
     Args:
         d: the diagnosis.
         folder: with its augmented fibre files.
         bases: fitted base of each fibre.
-        concealed: trials by what they test.
+        heldout: trials by what they test.
         alike: they were recorded as the shown ones were.
 
     Returns:
         rows with RMSD (F0; None: no solution), errors of the trial's own and mean force in the last `END_S` by model;
         arrays ``p<k>_time_s``, ``p<k>_measured_f0``, ``p<k>_before_f0`` and ``p<k>_after_f0``.
     """
-    every = [(tests, trial) for tests, group in concealed.items() for trial in group]
+    every = [(tests, trial) for tests, group in heldout.items() for trial in group]
     rows: list[dict[str, Any]] = []
     arrays: dict[str, Array] = {}
     for k, (tests, given) in enumerate(every):
@@ -108,5 +108,5 @@ def predictions(
 
 
 def warned_beforehand(d: Diagnosis, fibre: str) -> bool:
-    """Whether the diagnosis warned of absurd forces outside its study, before anything concealed was looked at."""
+    """Whether the diagnosis warned of absurd forces outside its study, before any held-out trial was looked at."""
     return any(line.startswith(f"fibre {fibre}: the answer") for line in d.warnings)

@@ -8,7 +8,8 @@ from typing import Any
 
 from xb_muscle_ros.diagnose.component import NAMED, OfFibre
 from xb_muscle_ros.diagnose.report import phrases as say
-from xb_muscle_ros.diagnose.result import Diagnosis, Place
+from xb_muscle_ros.diagnose.residual import Place
+from xb_muscle_ros.diagnose.result import Diagnosis
 
 _PLACES, _SETS, _COMPONENTS = 6, 8, 8
 # Components less probable than this are counted only.
@@ -33,12 +34,21 @@ def components(d: Diagnosis) -> str:
     """Components with evidence, the most probable first; the first ones where there is none."""
     likely = [c for c in d.components if c.inclusion_probability >= _LEAST][:_COMPONENTS]
     shown = likely or list(d.components[:3])
-    heads = ["component", "kind", "probability", "share", "held-out gain", "parameters (95 %)", "direction", "rivals"]
+    heads = [
+        "component",
+        "kind",
+        "probability",
+        "ablation loss",
+        "held-out gain",
+        "parameters (95 %)",
+        "direction",
+        "rivals",
+    ]
     cells = []
     for c in shown:
         told = "; ".join(f"{p.name} {say.estimate(p)}{' at bound' if p.at_bound else ''}" for p in c.parameters)
         name = c.members[0] if len(c.members) == 1 else f"{c.name}: {' or '.join(c.members)}"
-        share = say.share(c.share_of_mismatch) if c.inclusion_probability >= NAMED else say.NOTHING
+        share = say.share(c.ablation_loss) if c.inclusion_probability >= NAMED else say.NOTHING
         cells.append(
             [
                 name, c.kind.value, probability(c.inclusion_probability), share, say.gain(c.heldout_gain),
@@ -110,8 +120,8 @@ def sets(d: Diagnosis) -> str:
     return table(["set", "probability", "log evidence", "RMSD", "fitted"], cells)
 
 
-def concealed(rows: Sequence[Mapping[str, Any]]) -> str:
-    """How concealed trials are predicted."""
+def heldout(rows: Sequence[Mapping[str, Any]]) -> str:
+    """How held-out trials are predicted."""
     answered = any("after" in row["rmsd_f0"] for row in rows)
     heads = ["tests", "trial", "base"]
     heads += ["answer", "better", "warned beforehand"] if answered else []

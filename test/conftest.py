@@ -51,7 +51,7 @@ def new_domain() -> Iterator[Callable[[], int]]:
         if os.environ.get("CI"):
             raise
         pytest.skip(f"ROS 2 cannot be imported: {error}")
-    from xb_muscle_ros.node.process import private_domain
+    from xb_muscle_ros.node.client.process import private_domain
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")

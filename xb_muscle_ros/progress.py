@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from types import TracebackType
+from contextlib import AbstractContextManager
 from typing import TextIO
 
 from tqdm import tqdm
@@ -14,7 +14,7 @@ class _Bar(tqdm):  # type: ignore[misc]
     monitor_interval = 0
 
 
-class Progress:
+class Progress(AbstractContextManager["Progress"]):
     """A bar on stderr with count, share and time left, as long as stderr is a terminal.
 
     Closes with its ``with`` block, and leaves the last state of the bar on the terminal.
@@ -63,10 +63,5 @@ class Progress:
         """Leave the bar as it is."""
         self._bar.close()
 
-    def __enter__(self) -> Progress:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()

@@ -9,7 +9,7 @@ import pytest
 
 from xb_muscle_ros.cli.main import main
 from xb_muscle_ros.fit.coordinates import FITTED
-from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS, ORDINARY
 from xb_muscle_ros.models.fibre_file import load_fibre
 
 QUICK = ["--free", "f", "k21", "--starts", "1", "--no-intervals", "--processes", "0"]
@@ -209,9 +209,9 @@ def test_what_would_have_been_passed_over(
     [
         ([], {*ORDINARY}, "force_drift, transducer_lag"),
         (["--nuisance", "ordinary", "transducer_lag"], {*ORDINARY, "transducer_lag"}, "force_drift"),
-        (["--nuisance", "pca_shift=0.1"], {"pca_shift"}, ", ".join(n for n in FAULTS if n != "pca_shift")),
-        (["--no-nuisance"], set(), ", ".join(FAULTS)),
-        (["--nuisance", "none"], set(), ", ".join(FAULTS)),
+        (["--nuisance", "pca_shift=0.1"], {"pca_shift"}, ", ".join(n for n in ARTEFACTS if n != "pca_shift")),
+        (["--no-nuisance"], set(), ", ".join(ARTEFACTS)),
+        (["--nuisance", "none"], set(), ", ".join(ARTEFACTS)),
     ],
 )
 def test_ordinary_errors_are_fitted_unless_asked_otherwise(

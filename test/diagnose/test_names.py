@@ -7,14 +7,14 @@ import pickle
 
 from xb_muscle_ros.diagnose import answers
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, MECHANISMS, Name
-from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.registry import EXTRAS, SWAPS
 
 
 def test_names_are_those_of_mechanisms_and_faults() -> None:
     assert {n.value for n in answers.MECHANISMS} == set(EXTRAS) | set(SWAPS) == set(CATALOGUE)
-    assert {n.value for n in MEASUREMENT} == set(FAULTS)
+    assert {n.value for n in MEASUREMENT} == set(ARTEFACTS)
     assert (*answers.MECHANISMS, *MEASUREMENT) == answers.NAMES
     assert set(answers.FAMILY) == set(answers.NAMES)
 

@@ -15,7 +15,7 @@ from xb_muscle_ros.diagnose import notes
 from xb_muscle_ros.diagnose.effort import QUICK, Effort
 from xb_muscle_ros.diagnose.names import MECHANISMS, Name
 from xb_muscle_ros.fit.coordinates import Coordinate
-from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 from xb_muscle_ros.scores.noise.model import Source
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.trial import Trial
@@ -38,7 +38,7 @@ def said(
     ]
     system: Any = SimpleNamespace(
         closure_f0={"a": np.array([closure])} if closure else {},
-        error_sd=lambda name: FAULTS[name].sd,
+        error_sd=lambda name: ARTEFACTS[name].sd,
         problem=lambda names, values: SimpleNamespace(coordinates=tuple(coordinates)),
     )
     shown: Any = SimpleNamespace(names=(), values={})

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from made_trials import truth
 
+from xb_muscle_ros.diagnose import next_experiment
 from xb_muscle_ros.diagnose.component import Component, Kind
 from xb_muscle_ros.diagnose.names import FAMILY, Name
 from xb_muscle_ros.diagnose.next_experiment import menu, propose, scaled
 from xb_muscle_ros.diagnose.planning import _pairs
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import changed
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.simulation.offline import simulate_trial
@@ -80,3 +83,57 @@ def test_a_protocol_in_a_fibre_s_own_units() -> None:
     assert mine.length_change_l0 == pytest.approx(trial.length_change_l0)
     assert mine.length_m[0] == pytest.approx(1.2e-3)
     assert mine.facts.f0_n == 5e-4
+
+
+def linear_fibre(stiffness: float, drag: float) -> Any:
+    """A stand-in for a model whose force is known: a spring and a dashpot, F0 = stiffness length + drag velocity."""
+
+    def force(trial: Any) -> Any:
+        velocity = np.gradient(trial.length_change_l0, trial.time_s)
+        return SimpleNamespace(force_n=stiffness * trial.length_change_l0 + drag * velocity)
+
+    return force
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "words", "difference"),
+    [
+        # Two springs differ most where length is longest: after the stretch from the longer length, whatever the speed;
+        # the fastest ramp leaves the most of the record there.
+        ((1.0, 0.0), (3.0, 0.0), "a stretch by 4 % L0 at 2 L0/s from 5 % L0 beyond rest length", 0.166),
+        # Two dashpots differ in the ramp alone, most in the fastest: 0.02 F0·s/L0 at 2 L0/s for 20 ms of 1.22 s.
+        ((0.0, 0.0), (0.0, 0.02), "at 2 L0/s", 0.04 * np.sqrt(0.02 / 1.22)),
+    ],
+)  # fmt: skip
+def test_the_protocol_is_the_one_of_the_largest_difference(
+    one: tuple[float, float], other: tuple[float, float], words: str, difference: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The answer is known by hand: models whose force is a formula."""
+    monkeypatch.setattr(next_experiment, "Muscle", lambda fibre: linear_fibre(*fibre.pair))
+    monkeypatch.setattr(next_experiment, "simulate_trial", lambda muscle, trial: muscle(trial))
+    pairs = [SimpleNamespace(name="f", pair=pair) for pair in (one, other)]
+    found = propose(*pairs, ("a", "b"), (6.2,))  # type: ignore[arg-type]
+    assert found is not None
+    assert words in found.protocol.words
+    assert found.separates == ("a", "b")
+    assert found.difference_f0 == pytest.approx(difference, rel=0.03)
+    # No other protocol of the menu does better.
+    for protocol in menu("f", (6.2,)):
+        forces = [linear_fibre(*pair)(protocol.trial).force_n for pair in (one, other)]
+        assert float(np.sqrt(np.mean((forces[0] - forces[1]) ** 2))) <= found.difference_f0 + 1e-12
+
+
+def test_protocols_without_a_solution_are_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    def simulate(muscle: Any, trial: Any) -> Any:
+        if "stretch" in trial.facts.trial:
+            raise UserError("no solution")
+        return muscle(trial)
+
+    monkeypatch.setattr(next_experiment, "Muscle", lambda fibre: linear_fibre(*fibre.pair))
+    monkeypatch.setattr(next_experiment, "simulate_trial", simulate)
+    pairs = [SimpleNamespace(name="f", pair=pair) for pair in ((1.0, 0.0), (3.0, 0.0))]
+    found = propose(*pairs, (), (6.2,))  # type: ignore[arg-type]
+    assert found is not None
+    assert "a shortening by 4 % L0" in found.protocol.words
+    monkeypatch.setattr(next_experiment, "simulate_trial", lambda *_: simulate(None, menu("f", (6.2,))[0].trial))
+    assert propose(*pairs, (), (6.2,)) is None  # type: ignore[arg-type]

@@ -59,6 +59,6 @@ def test_a_law_s_row_has_its_numbers() -> None:
         np.array([0.01, 0.1]), np.array([0.2, 0.1]), np.array([3.0, 1.0]), 0.02, "force", 1, 0.7, {"constant": 0.4}
     )
     row = law_row("f", law)
-    assert (row.fibre, row.time_constant_s, row.scales_with, row.explained) == ("f", 0.02, "force", 0.7)
+    assert (row.fibre, row.time_constant_s, row.scales_with, row.explained_fraction) == ("f", 0.02, "force", 0.7)
     assert row.gain_f0_per_l0 == 4.0
-    assert (row.tau_s, row.weight_f0, row.others) == ((0.01, 0.1), (0.2, 0.1), {"constant": 0.4})
+    assert (row.tau_s, row.weight_f0, row.other_scalings) == ((0.01, 0.1), (0.2, 0.1), {"constant": 0.4})

@@ -14,7 +14,7 @@ import pytest
 from made_trials import FIBRE, given_fibre, trials_of, truth
 
 from xb_muscle_ros.cli.main import main
-from xb_muscle_ros.diagnose.report.output import read
+from xb_muscle_ros.diagnose.outputs import read
 from xb_muscle_ros.diagnose.report.traces import read_traces
 from xb_muscle_ros.diagnose.run import diagnose_bags
 from xb_muscle_ros.errors import UserError
@@ -66,7 +66,7 @@ def test_two_fibres_have_one_answer_and_each_its_own(ran: Ran) -> None:
     assert found.fibres == (FIBRE, OTHER)
     assert found.verdict.value in ("physics", "ambiguous")
     assert found.answer == ("viscous_drag",)
-    component = found.component("viscous_drag")
+    component = next(c for c in found.components if c.name == "viscous_drag")
     assert component is not None
     (drag,) = component.parameters
     assert drag.interval[0] < DRAG < drag.interval[1]

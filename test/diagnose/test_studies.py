@@ -31,7 +31,7 @@ class Done(NamedTuple):
     files: Files
 
     def component(self, name: str) -> Component:
-        found = self.found.component(name)
+        found = next((c for c in self.found.components if name in (c.name, *c.members)), None)
         assert found is not None
         return found
 
@@ -86,13 +86,19 @@ def test_ordinary_errors_and_other_parameters_are_nothing_to_name(null: Done) ->
     assert all(c.inclusion_probability < 0.2 for c in found.components)
     assert found.described
     assert found.before == found.after
-    assert found.explained_share == 0.0
+    assert found.explained_fraction == 0.0
     assert null.files.augmented == {}
     assert found.next_experiment is null.files.protocol is None
     # The errors that were made are among the nuisances, about as large as they were.
-    offsets = [n for n in found.nuisances if n.name == "force_offset"]
+    offsets = [n for n in found.nuisance_parameters if n.name == "force_offset"]
     assert len(offsets) == len(PCAS)
-    assert {n.name for n in found.nuisances} == {"pca_shift", "length_gain", "run_down", "force_offset", "time_shift"}
+    assert {n.name for n in found.nuisance_parameters} == {
+        "pca_shift",
+        "length_gain",
+        "run_down",
+        "force_offset",
+        "time_shift",
+    }
 
 
 def test_a_drag_is_physics_and_its_interval_holds_the_truth(drag: Done) -> None:
@@ -114,8 +120,8 @@ def test_a_drag_is_physics_and_its_interval_holds_the_truth(drag: Done) -> None:
     assert before is not None
     assert after is not None
     assert after < 0.5 * before
-    assert found.explained_share > 0.95
-    assert drag.component("viscous_drag").share_of_mismatch == pytest.approx(found.explained_share, abs=0.02)
+    assert found.explained_fraction > 0.95
+    assert drag.component("viscous_drag").ablation_loss == pytest.approx(found.explained_fraction, abs=0.02)
 
 
 def test_words_and_traces_agree_with_what_a_drag_does(drag: Done) -> None:
@@ -166,9 +172,9 @@ def test_two_mechanisms_are_two_components(two: Done) -> None:
     assert "static_calcium_stiffness" in (*elastic[0].members, *elastic[0].not_separable_from)
     assert {c.family for c in found.named} == {"parallel_viscoelasticity", "calcium_dependent_elasticity"}
     assert two.holds("drag", DRAG)
-    assert all(0.05 < c.share_of_mismatch < 1.0 for c in found.named)
+    assert all(0.05 < c.ablation_loss < 1.0 for c in found.named)
     assert all(c.heldout_gain is not None and c.heldout_gain.beyond_error for c in found.named)
-    assert found.explained_share > 0.95
+    assert found.explained_fraction > 0.95
 
 
 def test_cooperativity_that_the_base_lacks_is_found(thin: Done) -> None:
@@ -186,7 +192,7 @@ def test_a_solution_of_another_calcium_is_a_fault_of_the_measurement(wrong: Done
     assert found.answer == ()
     assert [c.name for c in found.named] == ["pca_shift"]
     assert found.named[0].kind is Kind.ARTEFACT
-    rows = {n.group: n.value for n in found.nuisances if n.name == "pca_shift"}
+    rows = {n.group: n.value for n in found.nuisance_parameters if n.name == "pca_shift"}
     # Calcium of all solutions together is the thin filament's to take up; that of one against the others is not.
     others = 0.5 * (rows["pCa 6"] + rows["pCa 6.4"])
     assert rows["pCa 6.2"] - others == pytest.approx(0.3, abs=0.06)

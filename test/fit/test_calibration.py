@@ -14,7 +14,7 @@ from xb_muscle_ros.fit.coordinates import fault_coordinates
 from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.data import FitTrial, fit_trials
 from xb_muscle_ros.fit.problem import Problem
-from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY, Scope
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS, ORDINARY, Scope
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.trials.trial import Trial
 
@@ -32,7 +32,7 @@ def problem_with(truth: Fibre, trials: tuple[FitTrial, ...], *names: str) -> Pro
 
 def test_one_fault_at_most_of_a_trial_or_solution_needs_a_simulation() -> None:
     """What `calibrated_force` counts on."""
-    assert [f.name for f in FAULTS.values() if f.on_input and f.scope is not Scope.STUDY] == ["pca_shift"]
+    assert [f.name for f in ARTEFACTS.values() if f.on_input and f.scope is not Scope.STUDY] == ["pca_shift"]
 
 
 def test_shift_of_a_held_out_solution(truth: Fibre, made_trials: Maker) -> None:

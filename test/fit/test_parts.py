@@ -21,7 +21,7 @@ from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.solve import Objective, descend
 from xb_muscle_ros.fit.split import held_out
 from xb_muscle_ros.fit.training import Training
-from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 from xb_muscle_ros.models.fibre_file import Fibre, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.scores.noise.autocovariance import autocovariance
@@ -54,7 +54,7 @@ def test_default_is_what_the_paper_fitted(start: Fibre) -> None:
 
 
 def test_faults_come_once_for_what_shares_them() -> None:
-    made = fault_coordinates(list(FAULTS), ["a", "b"], ["pCa 6", "pCa 6"], {"time_shift": 1e-3})
+    made = fault_coordinates(list(ARTEFACTS), ["a", "b"], ["pCa 6", "pCa 6"], {"time_shift": 1e-3})
     labels = [c.label for c in made]
     assert labels.count("pca_shift[pCa 6]") == 1
     assert labels.count("force_offset[a]") == labels.count("force_offset[b]") == 1
@@ -144,7 +144,9 @@ def test_problem_survives_the_way_to_a_worker(problem: Problem) -> None:
 
 
 def test_slopes_are_those_of_central_differences(problem: Problem) -> None:
-    faults = fault_coordinates(list(FAULTS), [t.name for t in problem.trials], [t.solution for t in problem.trials], {})
+    faults = fault_coordinates(
+        list(ARTEFACTS), [t.name for t in problem.trials], [t.solution for t in problem.trials], {}
+    )
     full = replace(problem, coordinates=problem.coordinates + faults, features=(F0_ANCHOR,))
     training = Training(full)
     # Off the bound that a lag of 0 lies on.

@@ -16,7 +16,7 @@ from xb_muscle_ros.fit.ordinary import shown_by
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.report import as_json
 from xb_muscle_ros.fit.run import Settings, fit
-from xb_muscle_ros.measurement.faults import ORDINARY
+from xb_muscle_ros.measurement.artefacts import ORDINARY
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.trials.phases import detect_phases
 from xb_muscle_ros.trials.trial import Trial, TrialFacts

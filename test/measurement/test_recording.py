@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 from xb_muscle_ros.measurement.recording import given_calcium, given_length, recorded_force
 
 TIME = np.arange(0.0, 0.2, 1e-3)
@@ -13,7 +13,7 @@ FORCE = 0.3 + np.interp(TIME, [0.0, 0.05, 0.1, 0.2], [0.0, 0.0, 0.5, 0.1])
 
 def test_no_fault_is_no_change():
     np.testing.assert_array_equal(recorded_force(TIME, FORCE, {}, 3), FORCE)
-    np.testing.assert_array_equal(recorded_force(TIME, FORCE, dict.fromkeys(FAULTS, 0.0), 3), FORCE)
+    np.testing.assert_array_equal(recorded_force(TIME, FORCE, dict.fromkeys(ARTEFACTS, 0.0), 3), FORCE)
     np.testing.assert_array_equal(given_length(FORCE, {}), FORCE)
     np.testing.assert_array_equal(given_calcium(FORCE, {}), FORCE)
 

@@ -80,7 +80,7 @@ def start(domain: int, request: pytest.FixtureRequest) -> Iterator[Callable[...,
 
     With `meet` false the driver stays silent, so that a player can have the topics for itself.
     """
-    from xb_muscle_ros.node.process import NodeProcess
+    from xb_muscle_ros.node.client.process import NodeProcess
 
     drivers: list[Driver] = []
     group = request.module.__name__.rpartition(".")[2]
@@ -102,6 +102,9 @@ def start(domain: int, request: pytest.FixtureRequest) -> Iterator[Callable[...,
         return driver
 
     yield make
+    for driver in drivers:
+        # All end side by side.
+        driver.process.ask_to_stop()
     for driver in drivers:
         driver.link.close()
         driver.process.stop()

@@ -15,8 +15,8 @@ class Driver:
     """Publishes to a muscle node and collects what it says.
 
     Attributes:
-        link: see `xb_muscle_ros.node.link`.
-        process: the node's; see `xb_muscle_ros.node.process`.
+        link: see `xb_muscle_ros.node.client.link`.
+        process: the node's; see `xb_muscle_ros.node.client.process`.
         forces, moments, reports: messages so far; reports as dictionaries, level and message among them.
     """
 
@@ -24,7 +24,7 @@ class Driver:
         from diagnostic_msgs.msg import DiagnosticArray
         from sensor_msgs.msg import JointState
 
-        from xb_muscle_ros.node.link import Link
+        from xb_muscle_ros.node.client.link import Link
 
         self.process = process
         self.domain = domain
@@ -50,8 +50,8 @@ class Driver:
             return all(node.count_publishers(f"muscle/{t}") for t in ("force", "moments"))
 
         assert self.link.wait_for(met, PATIENCE_S), self.process.log()
-        # Reports come without being asked for: once one is here, the node's side knows this one too.
-        assert self.link.wait_for(lambda: bool(self.reports), PATIENCE_S), self.process.log()
+        # An answer tells that the node's side knows this one too, and sooner than its next report.
+        self.link.state()
 
     def meet(self, fibre: str = FIBRE) -> None:
         """Make sure that a lockstep node hears all that is sent from now on, and is heard.

@@ -43,3 +43,16 @@ class Waiting:
         """Wait for some more messages."""
         target = len(self.emitted) + count
         self.until(lambda: len(self.emitted) >= target)
+
+    def rounds(self, count: int) -> None:
+        """Wait for the thread to come round some times, whether it steps or not."""
+        ticker, seen = self.realtime._ticker, list[None]()
+        ready = ticker._ready
+
+        def counted() -> bool:
+            seen.append(None)
+            return bool(ready())
+
+        ticker._ready = counted
+        self.until(lambda: len(seen) >= count)
+        ticker._ready = ready

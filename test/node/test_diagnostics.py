@@ -26,7 +26,7 @@ def test_levels() -> None:
     """Stopped is an error, odd or refused input and overruns are warnings, inactive is fine."""
     from diagnostic_msgs.msg import DiagnosticStatus
 
-    from xb_muscle_ros.node.inputs import Counts
+    from xb_muscle_ros.node.rules import Counts
 
     assert (status_of().level, status_of().message) == (DiagnosticStatus.OK, "stepping")
     fault = Status(ticks=10, violations=1, fault="state q2 became -1", waiting="")
@@ -136,15 +136,14 @@ def test_a_fibre_that_pushes_is_a_warning_until_the_next_report() -> None:
     from diagnostic_msgs.msg import DiagnosticStatus
 
     from xb_muscle_ros.models.muscle import Outputs
-    from xb_muscle_ros.node.inputs import Scale
-    from xb_muscle_ros.node.outputs import OutputMessages, OutputMessagesMany
+    from xb_muscle_ros.node.outputs import OutputMessages
 
     nowhere: Any = SimpleNamespace(publish=lambda message: None, get_subscription_count=lambda: 0)
-    one = OutputMessages("soleus", nowhere, nowhere)
+    one = OutputMessages(["soleus"], nowhere, nowhere)
     for force_f0 in (0.5, -0.2, -0.54, -0.1, -1e-5):
-        one.publish(0, Outputs(force_f0, *([0.0] * 10)), Scale(1.0, 1.0))
+        one.publish(0, None, np.array([Outputs(force_f0, *([0.0] * 10))]), np.ones((1, 2)))
     assert one.pushed == ("soleus", -0.54)
-    many = OutputMessagesMany(["a", "b"], nowhere, nowhere)
+    many = OutputMessages(["a", "b"], nowhere, nowhere)
     table = np.zeros((2, 11))
     many.publish(0, None, table, np.ones((2, 2)))
     assert many.pushed is None

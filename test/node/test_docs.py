@@ -17,14 +17,14 @@ def _in_words(default: object) -> str:
 @pytest.mark.usefixtures("domain")
 def test_every_parameter_is_in_the_docs_and_in_the_example(repo_root: Path) -> None:
     """With its default."""
-    from xb_muscle_ros.node.parameters import NODE_PARAMETERS, check_node_parameter
+    from xb_muscle_ros.node.parameters import NODE_PARAMETERS, check_value
 
     text = (repo_root / "docs" / "node.md").read_text(encoding="utf-8")
     tree = yaml.safe_load((repo_root / "config" / "muscle_node.yaml").read_text(encoding="utf-8"))
     example = tree["/**"]["ros__parameters"]
     assert set(example) == set(NODE_PARAMETERS)
     for name, row in NODE_PARAMETERS.items():
-        assert check_node_parameter(name, example[name]) == row.default
+        assert check_value(name, row, example[name]) == row.default
         line = next(line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
         assert row.when in line
         assert _in_words(row.default) in line

@@ -11,9 +11,7 @@ import pytest
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.node.inlet import Inlet
-from xb_muscle_ros.node.inlet_many import InletOfMany
-from xb_muscle_ros.node.inputs import Refusal
-from xb_muscle_ros.node.several import Trouble
+from xb_muscle_ros.node.rules import Refusal, Trouble
 
 FIBRES = ["left", "right", "back"]
 
@@ -32,10 +30,8 @@ class Taken:
         self.error: Refusal | UserError | None = None
 
     def take_length(self, stamp: int, *values: Any) -> Any:
-        if self.error is not None and isinstance(values[0], float):
-            raise self.error
         self.length.append((stamp, *(v.tolist() if isinstance(v, np.ndarray) else v for v in values)))
-        return [] if self.error is None else [Trouble(1, self.error)]
+        return [] if self.error is None else [Trouble(int(values[0][-1]) // 2, self.error)]
 
     def take_calcium(self, stamp: int, *values: Any) -> Any:
         self.calcium.append((stamp, *(v.tolist() if isinstance(v, np.ndarray) else v for v in values)))
@@ -49,14 +45,14 @@ def taken() -> Taken:
 
 @pytest.fixture
 def one(taken: Taken, notes: Any) -> Inlet:
-    inlet = Inlet("left", taken, notes)
+    inlet = Inlet(["left"], taken, notes)
     inlet.open = True
     return inlet
 
 
 @pytest.fixture
-def many(taken: Taken, notes: Any) -> InletOfMany:
-    inlet = InletOfMany(FIBRES, taken, notes)
+def many(taken: Taken, notes: Any) -> Inlet:
+    inlet = Inlet(FIBRES, taken, notes)
     inlet.open = True
     return inlet
 
@@ -64,12 +60,12 @@ def many(taken: Taken, notes: Any) -> InletOfMany:
 def test_one_takes_its_own_value(one: Inlet, taken: Taken) -> None:
     one.take_length(message([0.1, 0.2], ["right", "left"], [0.0, 3.0]))
     one.take_calcium(message([5.0]))
-    assert taken.length == [(1_000_000_005, 0.2, 3.0)]
-    assert taken.calcium == [(1_000_000_005, 5.0)]
+    assert taken.length == [(1_000_000_005, [0], [0.2], [3.0])]
+    assert taken.calcium == [(1_000_000_005, [0], [5.0])]
     assert one.last_length_s is not None
 
 
-def test_many_take_theirs_in_their_order(many: InletOfMany, taken: Taken) -> None:
+def test_many_take_theirs_in_their_order(many: Inlet, taken: Taken) -> None:
     many.take_length(message([0.3, 0.1], ["back", "left"]))
     many.take_calcium(message([5.0, 6.0, 7.0]))
     assert taken.length == [(1_000_000_005, [2, 0], [0.3, 0.1], None)]
@@ -152,7 +148,7 @@ def test_what_is_refused_stays_known_until_something_is_taken(
     assert not inlet.refusing
 
 
-def test_another_fibre_does_not_clear_what_is_refused_of_one(many: InletOfMany) -> None:
+def test_another_fibre_does_not_clear_what_is_refused_of_one(many: Inlet) -> None:
     """A message of which a part is refused for good is news as well."""
     many.take_calcium(message([-1.0, 1.0], ["left", "right"]))
     many.take_calcium(message([1.0], ["right"]))
@@ -163,8 +159,8 @@ def test_calcium_that_comes_twice_is_no_refusal(one: Inlet, taken: Taken) -> Non
     """Once as kept, once as sent; a stamp that is old for another reason is."""
     one.take_calcium(message([1.0], ["left"]), latched=True)
 
-    def refuse(stamp: int, *values: Any) -> None:
-        raise Refusal("stamp not after the last", "so it is")
+    def refuse(stamp: int, *values: Any) -> Any:
+        return [Trouble(0, Refusal("stamp not after the last", "so it is"))]
 
     taken.take_calcium = refuse  # type: ignore[method-assign]
     one.take_calcium(message([1.0], ["left"]))

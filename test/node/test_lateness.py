@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.node.lateness import Lateness
-from xb_muscle_ros.node.waiting import make_waiter
+from xb_muscle_ros.node.ticker import make_waiter
 
 
 def test_quantiles_are_those_of_the_data() -> None:

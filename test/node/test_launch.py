@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 FILES = ("muscle", "muscles", "closed_loop", "replay")
+LAUNCHING = "xb_muscle_ros/node/launching.py"
 
 
 def keys_by_name(text: str) -> Iterator[tuple[str, set[str]]]:
@@ -26,17 +27,18 @@ def keys_by_name(text: str) -> Iterator[tuple[str, set[str]]]:
 def test_parameters_are_those_of_the_nodes(repo_root: Path) -> None:
     """Whoever renames one is told."""
     from xb_muscle_ros.node.parameters import NODE_PARAMETERS, TEXTS
-    from xb_muscle_ros.plant.plant_parameters import parameters
+    from xb_muscle_ros.plant.plant_parameters import PLANT_PARAMETERS
 
     known = {
+        "OF_MUSCLES": {*NODE_PARAMETERS, *TEXTS, "use_sim_time"},
         "PARAMETERS": {*NODE_PARAMETERS, *TEXTS, "use_sim_time"},
-        "OF_BOTH": ({*NODE_PARAMETERS} | {*TEXTS}) & {*parameters()},
-        "OF_THE_BODY": {*parameters()},
+        "OF_BOTH": ({*NODE_PARAMETERS} | {*TEXTS}) & {*PLANT_PARAMETERS},
+        "OF_THE_BODY": {*PLANT_PARAMETERS},
         "OF_THE_MUSCLES": {*NODE_PARAMETERS},
     }
     met = 0
-    for name in FILES:
-        for table, keys in keys_by_name((repo_root / "launch" / f"{name}.launch.py").read_text(encoding="utf-8")):
+    for name in [*(f"launch/{name}.launch.py" for name in FILES), LAUNCHING]:
+        for table, keys in keys_by_name((repo_root / name).read_text(encoding="utf-8")):
             if table in known:
                 assert keys <= known[table], (name, keys - known[table])
                 met += 1
@@ -45,8 +47,11 @@ def test_parameters_are_those_of_the_nodes(repo_root: Path) -> None:
 
 def test_every_launch_file_takes_what_all_take(repo_root: Path) -> None:
     """And starts its nodes by the one function that makes use of it."""
-    for name in FILES:
+    for name in ("muscle", "muscles"):
         text = (repo_root / "launch" / f"{name}.launch.py").read_text(encoding="utf-8")
+        assert f'return muscle_description("{name}", ' in text, name
+    for name in ("launch/closed_loop.launch.py", "launch/replay.launch.py", LAUNCHING):
+        text = (repo_root / name).read_text(encoding="utf-8")
         assert "*common_arguments()" in text, name
         assert 'node(context, "muscle_node"' in text, name
         assert '"autostart": bool' in text, name

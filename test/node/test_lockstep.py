@@ -3,27 +3,30 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import itertools
 import math
 from typing import Any
 
 import pytest
+from alone import Alone, batch_of, emitting
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.node.inputs import Refusal, Scale
 from xb_muscle_ros.node.lockstep import Lockstep
+from xb_muscle_ros.node.rules import Refusal, Scale
 from xb_muscle_ros.node.status import Account
 
 SCALE = Scale(1.0, 1.0)
 SECOND = 1_000_000_000
 
 
-def build(muscle: Muscle, emitted: list[Any], notes: Any, simulated: bool = False) -> Lockstep:
+def build(muscle: Muscle, emitted: list[Any], notes: Any, simulated: bool = False) -> Any:
     """Keeps stamp and outputs of every answer."""
-    return Lockstep(muscle, SCALE, lambda stamp, out, scale: emitted.append((stamp, out)), notes, lambda: simulated)
+    emit = emitting(lambda stamp, out, scale: emitted.append((stamp, out)))
+    return Alone(Lockstep(batch_of(muscle), emit, notes, lambda: simulated))
 
 
 def test_calcium_far_ahead_and_missing_stamps_are_told(muscle: Muscle, notes: Any) -> None:
@@ -85,7 +88,7 @@ def test_a_jump_faster_than_any_muscle_is_refused(muscle: Muscle, notes: Any) ->
     assert [stamp for stamp, _ in emitted] == [0, 1_000_000]
 
 
-def sweep(lockstep: Lockstep, first_s: float = 0.0, samples: int = 40) -> None:
+def sweep(lockstep: Any, first_s: float = 0.0, samples: int = 40) -> None:
     """A slow stretch in steps of 10 ms, with its calcium before its length."""
     start = round(first_s * SECOND)
     lockstep.take_calcium(start, 5.0)
@@ -177,14 +180,13 @@ def test_calcium_and_length_may_go_back_in_either_order(muscle: Muscle, notes: A
 def test_going_back_ends_a_stop_and_takes_new_constants(muscle: Muscle, notes: Any) -> None:
     """As a reset does."""
     scales: list[Scale] = []
-    lockstep = Lockstep(
-        Violating(muscle.fibre), SCALE, lambda stamp, out, scale: scales.append(scale), notes, lambda: True
-    )
+    emit = emitting(lambda stamp, out, scale: scales.append(scale))
+    lockstep = Alone(Lockstep(batch_of(Violating(muscle.fibre)), emit, notes, lambda: True))
     lockstep.take_calcium(0, 5.0)
     lockstep.take_length(SECOND, 1.0, None)
     with pytest.raises(UserError, match="state q2"):
         lockstep.take_length(SECOND + 10_000_000, 1.2, None)
-    lockstep.next_scale = Scale(2.0, 3.0)
+    lockstep.replace(0, dataclasses.replace(muscle.fibre, reference_length_m=2.0, f0_n=3.0))
     with pytest.raises(Refusal, match="stopped"):
         lockstep.take_length(2 * SECOND, 1.0, None)
     lockstep.take_length(0, 2.0, None)

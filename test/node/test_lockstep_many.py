@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from alone import Alone, batch_of, emitting
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from many_fibres import Answers, fibres, fragile
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.batch import MuscleBatch
-from xb_muscle_ros.node.inputs import Refusal, scale_of
 from xb_muscle_ros.node.lockstep import Lockstep
-from xb_muscle_ros.node.lockstep_many import LockstepMany
+from xb_muscle_ros.node.rules import Refusal
 from xb_muscle_ros.node.status import Account
 
 SECOND = 10**9
@@ -40,14 +40,14 @@ def test_lockstep_is_that_of_single_fibres_to_the_bit(
 ) -> None:
     """Whatever messages name whom, and whatever is wrong with them: answers, refusals and accounts are the same."""
     answers, singly = Answers(), Answers()
-    many = LockstepMany(batch, answers.emit, notes, lambda: simulated)
+    many = Lockstep(batch, answers.emit, notes, lambda: simulated)
     ones = []
     for i, muscle in enumerate(batch.muscles):
 
         def emit(stamp: int, out: Any, scale: Any, i: int = i) -> None:
             singly.rows[i].append((stamp, tuple(out), tuple(scale)))
 
-        ones.append(Lockstep(muscle, scale_of(muscle.fibre), emit, notes, lambda: simulated))
+        ones.append(Alone(Lockstep(batch_of(muscle), emitting(emit), notes, lambda: simulated)))
     now = SECOND
     for kind, ahead, whom, lengths, calcium in events:
         now += ahead * 1_000_000
@@ -81,7 +81,7 @@ def test_lockstep_is_that_of_single_fibres_to_the_bit(
 def test_a_message_for_all_is_answered_in_one(batch: MuscleBatch, notes: Any) -> None:
     """In the order of the fibres, also where the sender has another; one for some has an answer of some."""
     answers = Answers()
-    many = LockstepMany(batch, answers.emit, notes, lambda: False)
+    many = Lockstep(batch, answers.emit, notes, lambda: False)
     many.take_calcium(0, fibres(0, 1, 2), np.array([5.0, 6.0, 7.0]))
     for k, order in enumerate([(0, 1, 2), (2, 0, 1), (1, 2, 0)]):
         many.take_length(k * 1_000_000, fibres(*order), np.array([0.1 * (i + 1) for i in order]), None)
@@ -93,7 +93,7 @@ def test_a_message_for_all_is_answered_in_one(batch: MuscleBatch, notes: Any) ->
 
 def test_one_line_for_all_whose_time_went_back(batch: MuscleBatch, notes: Any) -> None:
     """With the names of some."""
-    many = LockstepMany(batch, Answers().emit, notes, lambda: True)
+    many = Lockstep(batch, Answers().emit, notes, lambda: True)
     for stamp in (5 * SECOND, 0):
         many.take_calcium(stamp, fibres(0, 1, 2), np.full(3, 5.0))
         many.take_length(stamp, fibres(0, 1, 2), np.array([0.1, 0.2, 0.3]), None)
@@ -105,8 +105,8 @@ def test_one_line_for_all_whose_time_went_back(batch: MuscleBatch, notes: Any) -
 def test_snapshots_of_all_go_on_to_the_bit(batch: MuscleBatch, notes: Any) -> None:
     """And there are none while one fibre has no state."""
     whole, halves = Answers(), Answers()
-    first = LockstepMany(batch, whole.emit, notes, lambda: False)
-    other = LockstepMany(batch, halves.emit, notes, lambda: False)
+    first = Lockstep(batch, whole.emit, notes, lambda: False)
+    other = Lockstep(batch, halves.emit, notes, lambda: False)
     first.take_calcium(0, fibres(0, 1, 2), np.array([5.0, 6.0, 7.0]))
     first.take_length(0, fibres(0, 1), np.array([0.1, 0.2]), None)
     with pytest.raises(UserError, match="fibre back: there is no state to save yet"):
@@ -124,7 +124,7 @@ def test_snapshots_of_all_go_on_to_the_bit(batch: MuscleBatch, notes: Any) -> No
 def test_a_fibre_that_fails_does_not_stop_the_others(batch: MuscleBatch, notes: Any) -> None:
     """It is named, refused from then on, and there again after a reset."""
     answers = Answers()
-    many = LockstepMany(fragile(batch, 1), answers.emit, notes, lambda: False)
+    many = Lockstep(fragile(batch, 1), answers.emit, notes, lambda: False)
     every, length = fibres(0, 1, 2), np.array([0.1, 0.2, 0.3])
     many.take_calcium(0, every, np.full(3, 5.0))
     assert many.take_length(0, every, length, None) == []

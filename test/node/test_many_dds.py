@@ -211,7 +211,7 @@ def test_fibres_can_be_others_after_a_clean_up(start: Callable[..., Any]) -> Non
 
 def test_fibres_that_do_not_fit_fail_the_configuration(domain: int) -> None:
     """One line that names the remedy."""
-    from xb_muscle_ros.node.process import NodeProcess
+    from xb_muscle_ros.node.client.process import NodeProcess
 
     cases = {
         "found both; give one": {"fiber_file": FILES[0], "fiber_files": f"[{FILES[0]}]"},

@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from xb_muscle_ros.node.memory import lock_memory
-from xb_muscle_ros.node.priority import take_priority
+from xb_muscle_ros.node.privileges import lock_memory, take_priority
 
 
 def test_priority_that_is_refused(notes: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,14 +7,13 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from alone import Alone, batch_of, emitting
 from realtime_bench import SETTINGS, Waiting
 
 from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.muscle import Muscle, Outputs
-from xb_muscle_ros.node.inputs import Refusal, Scale
 from xb_muscle_ros.node.realtime import Realtime, Settings
-
-SCALE = Scale(1.0, 1.0)
+from xb_muscle_ros.node.rules import Refusal, Scale
 
 
 class Bench(Waiting):
@@ -25,7 +24,9 @@ class Bench(Waiting):
         self.notes = notes
         self.simulated = False
         self.on_emit: Callable[[], None] = lambda: None
-        self.realtime = Realtime(muscle, SCALE, settings, self._emit, time.monotonic_ns, notes, lambda: self.simulated)
+        emit = emitting(self._emit)
+        mode = Realtime(batch_of(muscle), settings, emit, time.monotonic_ns, notes, lambda: self.simulated)
+        self.realtime: Any = Alone(mode)
 
     def _emit(self, stamp: int, outputs: Outputs, scale: Scale) -> None:
         self.emitted.append(outputs)
@@ -33,8 +34,7 @@ class Bench(Waiting):
 
     def state(self) -> dict[str, float]:
         """The newest state by name."""
-        values: Any = self.realtime._state
-        return dict(zip(self.realtime.muscle.state_names, values.tolist(), strict=True))
+        return dict(zip(self.realtime.batch.muscles[0].state_names, self.realtime._states[0].tolist(), strict=True))
 
 
 @pytest.fixture
@@ -133,7 +133,7 @@ def test_violation_stops_the_output_until_reset(make: Callable[..., Bench], musc
     bench.realtime.take_length(0, 1.2, None)
     bench.until(lambda: bench.notes.lines)
     count = len(bench.emitted)
-    time.sleep(0.05)
+    bench.rounds(25)
     assert len(bench.emitted) == count
     assert len(bench.notes.lines) == 1
     assert bench.notes.lines[0].startswith("error stopped: fibre 18Dec2017a: state q2")
@@ -153,8 +153,7 @@ def test_stop_and_start_hold_the_state(make: Callable[..., Bench], muscle: Muscl
     bench.realtime.take_length(0, 1.0, None)
     bench.emit_more(3)
     bench.realtime.stop()
-    held = bench.realtime._state
-    assert held is not None
+    assert bench.realtime._live.all()
     bench.realtime.start()
     bench.emit_more(3)
     assert bench.realtime.status().waiting == ""
@@ -202,15 +201,16 @@ def test_an_age_of_zero_allows_any(make: Callable[..., Bench], muscle: Muscle) -
     bench.emit_more(60)
     assert bench.realtime.status().timeouts == 0
     bench.realtime.stop()
-    bench.realtime.settings = SETTINGS._replace(timeout_s=5.0)
-    length: Any = bench.realtime._length
-    bench.realtime._length = length._replace(arrival_ns=length.arrival_ns - 60 * 10**9)
+    bench.realtime.mode.settings = SETTINGS._replace(timeout_s=5.0)
+    samples = bench.realtime._samples
+    long_ago = samples.inputs.arrival_ns - 60 * 10**9
+    samples.inputs = samples.inputs._replace(arrival_ns=long_ago, oldest_ns=int(long_ago[0]))
     bench.realtime.start()
     bench.emit_more(3)
     assert bench.notes.lines == []
-    bench.realtime.settings = SETTINGS._replace(timeout_s=0.001)
+    bench.realtime.mode.settings = SETTINGS._replace(timeout_s=0.001)
     bench.until(lambda: bench.realtime.status().on_timeout == "isometric")
-    bench.realtime.settings = SETTINGS
+    bench.realtime.mode.settings = SETTINGS
     bench.until(lambda: not bench.realtime.status().on_timeout)
     assert bench.notes.lines[-1] == "info timeout_s is 0 s now: isometric ends"
 

@@ -12,10 +12,10 @@ import pytest
 RATE_HZ = 250.0
 
 
-def feed(driver: Any, seconds: float, fresh_stamps: bool = True) -> None:
-    """Length that swings at about 100 Hz, and calcium."""
+def feed(driver: Any, seconds: float, fresh_stamps: bool = True, enough: int | None = None) -> None:
+    """Length that swings at about 100 Hz, and calcium, for some time or until there are enough forces."""
     begin = time.monotonic()
-    while (now := time.monotonic() - begin) < seconds:
+    while (now := time.monotonic() - begin) < seconds and (enough is None or len(driver.forces) < enough):
         # Best effort: a message sent before both sides know each other is lost, so it is sent again and again.
         driver.send("calcium", time.time() if fresh_stamps else 0.0, 5.0)
         swing = 0.01 * np.sin(2 * np.pi * now)
@@ -27,7 +27,7 @@ def test_forces_come_at_the_rate_and_never_violate(start: Callable[..., Any]) ->
     """Also with the length carried on by its velocity; reset and bad input do not stop it."""
     driver = start(mode="realtime", rate_hz=RATE_HZ, extrapolate=True)
     assert driver.report(lambda r: True)["message"] == "waiting for length and calcium"
-    feed(driver, 0.5)
+    feed(driver, 30.0, enough=1)
     driver.link.reset()
     driver.forces.clear()
     feed(driver, 1.0)
@@ -55,7 +55,7 @@ def test_forces_come_at_the_rate_and_never_violate(start: Callable[..., Any]) ->
 def test_unstamped_messages_are_taken(start: Callable[..., Any]) -> None:
     """`ros2 topic pub` leaves stamps at zero; the steady clock needs none."""
     driver = start(mode="realtime", rate_hz=RATE_HZ)
-    feed(driver, 1.0, fresh_stamps=False)
+    feed(driver, 30.0, fresh_stamps=False, enough=11)
     assert len(driver.forces) > 10
     assert int(driver.report(lambda r: True)["refused"]) == 0
 
@@ -63,7 +63,7 @@ def test_unstamped_messages_are_taken(start: Callable[..., Any]) -> None:
 def test_nodes_in_different_namespaces_do_not_mix(start: Callable[..., Any]) -> None:
     """Only the one that is fed answers."""
     fed, idle = start(mode="realtime", rate_hz=RATE_HZ), start(mode="realtime", rate_hz=RATE_HZ)
-    feed(fed, 1.0)
+    feed(fed, 30.0, enough=50)
     idle.link.wait_for(lambda: bool(idle.forces), 0.5)
     assert fed.forces
     assert not idle.forces
@@ -82,7 +82,7 @@ def test_rate_can_be_set_while_inactive(start: Callable[..., Any]) -> None:
     change(Transition.TRANSITION_DEACTIVATE)
     driver.link.set_parameters({"rate_hz": 50.0})
     change(Transition.TRANSITION_ACTIVATE)
-    feed(driver, 0.5)
+    feed(driver, 30.0, enough=1)
     driver.forces.clear()
     feed(driver, 1.5)
     assert 30 < len(driver.forces) < 120
@@ -90,7 +90,7 @@ def test_rate_can_be_set_while_inactive(start: Callable[..., Any]) -> None:
 
 def test_node_and_plain_timer_are_measured_side_by_side(domain: int) -> None:
     """All figures of a short run; which is better is not for a test to say."""
-    from xb_muscle_ros.node.timing import run_beside_plain_timer
+    from xb_muscle_ros.bench.timing import run_beside_plain_timer
 
     for figures in run_beside_plain_timer(3.0, 250.0):
         assert figures["ticks"] > 0.7 * 3.0 * 250.0
@@ -106,7 +106,7 @@ def test_node_and_plain_timer_are_measured_side_by_side(domain: int) -> None:
 
 def test_the_way_there_and_back_is_measured(domain: int) -> None:
     """With several fibres in each message."""
-    from xb_muscle_ros.node.timing import run_roundtrip
+    from xb_muscle_ros.bench.timing import run_roundtrip
 
     figures = run_roundtrip(3.0, 100.0, fibres=3)
     assert 50.0 < figures["p50_us"] <= figures["p99_us"] <= figures["p99.9_us"] <= figures["max_us"]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from xb_muscle_ros import __version__
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.node.inputs import Scale
+from xb_muscle_ros.node.rules import Scale
 from xb_muscle_ros.node.saved_state import load_state, save_state
 from xb_muscle_ros.node.status import Account, Snapshot
 
@@ -26,17 +27,17 @@ class Keeps:
     """Something with a state, and nothing that moves it."""
 
     def __init__(self, muscle: Muscle, snapshot: Snapshot | None = None) -> None:
-        self.muscle = muscle
+        self.batch: Any = SimpleNamespace(muscles=[muscle])
         self.snapshot = snapshot
 
-    def save(self) -> Snapshot:
+    def save(self) -> Sequence[Snapshot]:
         """What was put there."""
         assert self.snapshot is not None
-        return self.snapshot
+        return [self.snapshot]
 
-    def load(self, snapshot: Snapshot) -> None:
+    def load(self, snapshots: Sequence[Snapshot]) -> None:
         """Put it there."""
-        self.snapshot = snapshot
+        (self.snapshot,) = snapshots
 
 
 @pytest.fixture
@@ -66,6 +67,22 @@ def test_every_bit_comes_back(muscle: Muscle, snapshot: Snapshot, tmp_path: Path
     assert (tree["fibre"], tree["model"], tree["version"]) == ("18Dec2017a", "3state_coop", __version__)
     assert tree["parameters"]["models.3state_coop.f"] == muscle.fibre.values["f"]
     assert tree["state"].keys() == set(muscle.state_names)
+
+
+def test_a_list_of_one_is_one(muscle: Muscle, snapshot: Snapshot, tmp_path: Path) -> None:
+    """As a node of many that had a single fibre wrote it; of two it is said which are there."""
+    path = tmp_path / "state.json"
+    save_state(str(path), "lockstep", Keeps(muscle, snapshot))
+    tree = json.loads(path.read_text(encoding="utf-8"))
+    tree = {"format": "xb_muscle_ros states 1", "version": tree["version"], "fibres": [tree]}
+    path.write_text(json.dumps(tree), encoding="utf-8")
+    other = Keeps(muscle)
+    load_state(str(path), "lockstep", other)
+    assert other.snapshot is not None
+    assert other.snapshot.state.tobytes() == snapshot.state.tobytes()
+    path.write_text(json.dumps({**tree, "fibres": 2 * tree["fibres"]}), encoding="utf-8")
+    with pytest.raises(UserError, match=r"has fibres = \['18Dec2017a', '18Dec2017a'\], this node has \['18Dec2017a'\]"):
+        load_state(str(path), "lockstep", other)
 
 
 def other_value(muscle: Muscle) -> Muscle:

@@ -147,7 +147,7 @@ def test_a_state_that_cannot_be_loaded_at_the_start_ends_the_node(
     domain: int, tmp_path: Path, text: str, words: str
 ) -> None:
     """With one line and code 2; a fibre that settles anew in silence would be another one."""
-    from xb_muscle_ros.node.process import NodeProcess
+    from xb_muscle_ros.node.client.process import NodeProcess
 
     given = {"fiber_file": "18Dec2017a", "load_state_at_start": True}
     if text:

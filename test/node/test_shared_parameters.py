@@ -84,7 +84,7 @@ def test_no_fibre_names_the_node_and_the_wildcard() -> None:
 def test_a_file_for_both_nodes_stops_neither() -> None:
     """What is the muscle node's is no slip of the plant's, however alike, and the other way round."""
     from xb_muscle_ros.node.parameters import NODE_PARAMETERS, TEXTS
-    from xb_muscle_ros.plant.plant_parameters import parameters, read
+    from xb_muscle_ros.plant.plant_parameters import PLANT_PARAMETERS, read
 
     class Node:
         """As much of a node as is asked for."""
@@ -115,7 +115,7 @@ def test_a_file_for_both_nodes_stops_neither() -> None:
     with pytest.raises(UserError, match="did you mean 'scene'"):
         read(Node({"scenee": "knee"}))
     own = {*NODE_PARAMETERS, *TEXTS}
-    of_plant = [name for name in parameters() if name not in own]
+    of_plant = [name for name in PLANT_PARAMETERS if name not in own]
     assert foreign_keys(of_plant, own) == of_plant
 
 

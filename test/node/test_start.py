@@ -54,7 +54,7 @@ BAD_ARGUMENTS = {
 
 def assert_ends_with_one_line(domain: int, arguments: list[str], expected: list[str]) -> None:
     """Run the node with arguments that cannot work."""
-    from xb_muscle_ros.node.process import NodeProcess
+    from xb_muscle_ros.node.client.process import NodeProcess
 
     with NodeProcess(domain, {}, arguments) as child:
         code = child.wait()
@@ -98,7 +98,7 @@ def test_signals_end_the_node_cleanly(start: Callable[..., Any], mode: str, numb
 
 def test_a_signal_while_starting_ends_the_node_cleanly(domain: int) -> None:
     """Python is long at importing; that is no time for tracebacks either."""
-    from xb_muscle_ros.node.process import NodeProcess
+    from xb_muscle_ros.node.client.process import NodeProcess
 
     with NodeProcess(domain, {"fiber_file": FIBRE}) as child:
         maps = Path(f"/proc/{child.process.pid}/maps")

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from xb_muscle_ros.node.process import child_environment
+from xb_muscle_ros.node.client.process import child_environment
 
 # Nodes print nothing but their help, so nothing is half done; argparse swallows the news itself.
 NO_ERROR = ("muscle_node", "plant_node", "xb_muscle", "a command")

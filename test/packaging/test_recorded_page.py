@@ -1,4 +1,4 @@
-"""The page of the recordings: what stays of a former one, and how concealed trials are told."""
+"""The page of the recordings: what stays of a former one, and how held-out trials are told."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from xb_muscle_ros.diagnose.report import output
+from xb_muscle_ros.diagnose import outputs
 
 _SCRIPTS = Path(__file__).parents[2] / "scripts"
 
@@ -47,7 +47,7 @@ def test_sections_of_the_former_version_are_marked_once_and_others_stay_as_they_
 
 
 def test_a_trial_without_solution_by_the_answer_is_not_better(tables: ModuleType) -> None:
-    lines = tables.concealed([_row(0.02, 0.01), _row(0.02, None, True), _row(None, 0.05)]).splitlines()[2:]
+    lines = tables.heldout([_row(0.02, 0.01), _row(0.02, None, True), _row(None, 0.05)]).splitlines()[2:]
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     assert [row[2:6] for row in cells[:3]] == [
         ["2.00", "1.00", "yes", "no"],
@@ -61,7 +61,7 @@ def test_a_trial_without_solution_by_the_answer_is_not_better(tables: ModuleType
 def test_where_there_is_no_answer_the_base_stands_alone(tables: ModuleType) -> None:
     row = _row(0.02, None)
     row["rmsd_f0"] = {"before": 0.02}
-    text = tables.concealed([row])
+    text = tables.heldout([row])
     assert "answer" not in text
     assert "50.00 / 40.00 |" in text
 
@@ -72,8 +72,8 @@ def test_a_section_has_every_fibre_and_an_overview_every_study(
     monkeypatch.syspath_prepend(Path(__file__).parents[1] / "diagnose" / "report")
     d = importlib.import_module("sample_diagnoses").five_fibres().diagnosis
     cases = importlib.import_module("recorded_cases").CASES
-    (tmp_path / "diagnosis.json").write_text(json.dumps(output.as_row(d)))
-    (tmp_path / "predictions.json").write_text(json.dumps({"concealed": [_row(0.02, 0.01), _row(0.02, 0.05)]}))
+    (tmp_path / "diagnosis.json").write_text(json.dumps(outputs.as_row(d)))
+    (tmp_path / "predictions.json").write_text(json.dumps({"heldout": [_row(0.02, 0.01), _row(0.02, 0.05)]}))
     text = page.write_page([(cases["fibres_2state"], tmp_path)], "images", "## Five rat soleus fibres, base `2state`\n")
     assert page.FORMER not in text
     assert text.count("## Five rat soleus fibres, base `2state`\n") == 1

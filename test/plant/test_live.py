@@ -19,7 +19,7 @@ MODEL = "3state_coop"
 @pytest.fixture(scope="module")
 def nodes(new_domain: Callable[[], int]) -> Iterator[int]:
     """Muscle nodes in lockstep for both scenes, in namespaces of their own; their ROS domain."""
-    from xb_muscle_ros.node.process import NodeProcess
+    from xb_muscle_ros.node.client.process import NodeProcess
 
     domain = new_domain()
     wanted = {"fiber_file": "18Dec2017a", "model": MODEL, "mode": "lockstep"}
@@ -30,10 +30,10 @@ def nodes(new_domain: Callable[[], int]) -> Iterator[int]:
 
 
 def test_over_dds_is_as_in_process_and_repeats(nodes: int) -> None:
-    from xb_muscle_ros.plant.live import run_ankle_live
+    from xb_muscle_ros.plant.live import over_ros
 
     fibre, platform = load_fibre("18Dec2017a", MODEL), RampAndHold()
-    first, second = (run_ankle_live(fibre, platform, 0.15, domain_id=nodes, namespace="/ankle") for _ in range(2))
+    first, second = (run_ankle(fibre, platform, 0.15, muscles=over_ros(nodes, "/ankle")) for _ in range(2))
     assert first.force_n.tobytes() == second.force_n.tobytes()
     assert first.angle_rad.tobytes() == second.angle_rad.tobytes()
     inside = run_ankle(fibre, platform, 0.15)
@@ -44,10 +44,10 @@ def test_over_dds_is_as_in_process_and_repeats(nodes: int) -> None:
 
 def test_elastic_tendons_over_dds(nodes: int) -> None:
     """One answer per tick does nearly as well as the balance that is solved for in one process."""
-    from xb_muscle_ros.plant.live import run_ankle_live
+    from xb_muscle_ros.plant.live import over_ros
 
     fibre, platform = load_fibre("18Dec2017a", MODEL), RampAndHold()
-    live = run_ankle_live(fibre, platform, 0.15, elastic=True, domain_id=nodes, namespace="/ankle")
+    live = run_ankle(fibre, platform, 0.15, True, over_ros(nodes, "/ankle"))
     inside = run_ankle(fibre, platform, 0.15, elastic=True)
     rise = inside.force_n[-1, 0] - inside.force_n[0, 0]
     assert rise > 50.0
@@ -58,11 +58,11 @@ def test_elastic_tendons_over_dds(nodes: int) -> None:
 @pytest.mark.parametrize("elastic", [False, True])
 def test_knee_over_dds(nodes: int, elastic: bool) -> None:
     """Without the parallel element, which the plant takes out of the node's fibre; moved before release as well."""
-    from xb_muscle_ros.plant.live import run_knee_live
+    from xb_muscle_ros.plant.live import over_ros
 
     fibre = load_fibre("18Dec2017a", MODEL)
     assert fibre.values["kpe"] > 0.0
-    live = run_knee_live(fibre, True, 0.3, elastic, domain_id=nodes, namespace="/knee")
+    live = run_knee(fibre, True, 0.3, elastic, over_ros(nodes, "/knee"))
     inside = run_knee(fibre, True, 0.3, elastic)
     # Peak 180 N.
     assert np.max(np.abs(live.force_n - inside.force_n)) < (1.0 if elastic else 1e-5)
@@ -72,11 +72,11 @@ def test_knee_over_dds(nodes: int, elastic: bool) -> None:
 
 def test_wrong_nodes_are_named(nodes: int) -> None:
     from xb_muscle_ros.errors import UserError
-    from xb_muscle_ros.plant.live import run_ankle_live
+    from xb_muscle_ros.plant.live import over_ros
 
     with pytest.raises(
         UserError, match=r"has model = 3state_coop, needed is hill_se; .* -r __ns:=/ankle .*model:=hill_se"
     ):
-        run_ankle_live(load_fibre("18Dec2017a", "hill_se"), RampAndHold(), 0.05, domain_id=nodes, namespace="/ankle")
+        run_ankle(load_fibre("18Dec2017a", "hill_se"), RampAndHold(), 0.05, muscles=over_ros(nodes, "/ankle"))
     with pytest.raises(UserError, match="has no fibre 'soleus'"):
-        run_ankle_live(load_fibre("18Dec2017a", MODEL), RampAndHold(), 0.05, domain_id=nodes, namespace="/knee")
+        run_ankle(load_fibre("18Dec2017a", MODEL), RampAndHold(), 0.05, muscles=over_ros(nodes, "/knee"))

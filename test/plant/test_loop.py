@@ -88,7 +88,7 @@ def test_forces_of_the_loop_are_the_fibre_model_s(standing: dict[str, Trace]) ->
 
     fibre = load_fibre("18Dec2017a", "3state_coop")
     trace, muscle = standing["3state_coop"], Muscle(fibre)
-    calcium = trace.activation["soleus"]
+    calcium = trace.driven_by["calcium_um"]["soleus"]
     state = muscle.settle(0.0, calcium)
     lengths = np.ascontiguousarray(trace.length_change_l0[:, 0])
     states = muscle.run(state, np.full(lengths.size - 1, 0.001), lengths, np.full(lengths.size, calcium))

@@ -25,7 +25,7 @@ class Stage:
     """
 
     def __init__(self, domain: int) -> None:
-        from xb_muscle_ros.node.link import Link
+        from xb_muscle_ros.node.client.link import Link
 
         self.domain = domain
         self.link = Link("audience", domain_id=domain)
@@ -44,7 +44,7 @@ class Stage:
     def _start(self, name: str, space: str, given: dict[str, Any], module: str) -> None:
         from sensor_msgs.msg import JointState
 
-        from xb_muscle_ros.node.process import NodeProcess
+        from xb_muscle_ros.node.client.process import NodeProcess
 
         self.processes[name] = NodeProcess(self.domain, given, ["-r", f"__ns:={space}"], module)
         if space not in self.joints:
@@ -157,7 +157,7 @@ def test_bad_parameters_end_with_code_2_and_one_line(stage: Stage, given: dict[s
 
 def test_arguments_that_are_not_of_ros_are_refused() -> None:
     """Both nodes; without --ros-args a parameter would be passed over."""
-    from xb_muscle_ros.node.arguments import begin
+    from xb_muscle_ros.node.program import begin
 
     for arguments in (["extra"], ["--", "x"]):
         with pytest.raises(UserError, match=f"argument '{arguments[0]}' is not known; ROS arguments come after"):
@@ -180,7 +180,7 @@ def test_a_body_that_falls_ends_its_episode_with_reason_code_and_last_state(stag
 
 def test_a_muscle_node_that_takes_no_more_lengths_ends_the_episode(stage: Stage) -> None:
     """Here another sender has moved its time on; the reason comes from its diagnostics."""
-    from xb_muscle_ros.node.link import Link
+    from xb_muscle_ros.node.client.link import Link
 
     stage.muscle("/f", "lockstep")
     with Link("meddler", "/f", stage.domain) as link:

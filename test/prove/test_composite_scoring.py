@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.diagnose.names import FAMILY, Name
-from xb_muscle_ros.prove.calibration import Stated, calibration_score, error, reliability
-from xb_muscle_ros.prove.composite_counting import as_families, by_family, by_size, scores
-from xb_muscle_ros.prove.composite_figures import ANSWERS, SILENT, TRUTHS, families
-from xb_muscle_ros.prove.composite_judging import JudgedComposite, judge_composite
-from xb_muscle_ros.prove.counting import Score
-from xb_muscle_ros.prove.judging import judge
+from xb_muscle_ros.prove import calibration
+from xb_muscle_ros.prove.answers import Answer
+from xb_muscle_ros.prove.calibration import Stated, as_families, by_family, calibration_score, error, reliability
+from xb_muscle_ros.prove.counting import Score, by_size, of_composites
+from xb_muscle_ros.prove.judging import JudgedComposite, judge, judge_composite
 from xb_muscle_ros.prove.make import seal
-from xb_muscle_ros.prove.run import RESULTS, needed
+from xb_muscle_ros.prove.run import RESULTS
 from xb_muscle_ros.prove.score import score
+from xb_muscle_ros.prove.score_figures import ANSWERS, SILENT, TRUTHS, families
 from xb_muscle_ros.prove.sealing import COMPOSITES, SINGLES
 
 LENGTH = "length_dependence"
@@ -29,7 +29,7 @@ def truth(case: str, kind: str, effects: dict[str, float] | None = None, *artefa
     rows = [
         {
             "label": label, "family": None if label.startswith("outside:") else FAMILY[Name(label)],
-            "beside_rest_f0": size,
+            "unique_contribution_f0": size,
         }
         for label, size in (effects or {}).items()
     ]  # fmt: skip
@@ -39,7 +39,7 @@ def truth(case: str, kind: str, effects: dict[str, float] | None = None, *artefa
 
 
 def said(verdict: str, stated: dict[str, float], **more: Any) -> dict[str, Any]:
-    """A diagnosis in format 2: components by name with their probabilities; a family's name stands for its members."""
+    """A row of results: components by name with their probabilities; a family's name stands for its members."""
     rows = []
     for name, probability in sorted(stated.items(), key=lambda item: -item[1]):
         known = name in FAMILY
@@ -49,18 +49,18 @@ def said(verdict: str, stated: dict[str, float], **more: Any) -> dict[str, Any]:
         rows.append(
             {
                 "name": name, "kind": "artefact" if artefact else "mechanism", "family": family, "members": members,
-                "inclusion_probability": probability, "share_of_mismatch": 0.5,
+                "inclusion_probability": probability,
             }
         )  # fmt: skip
     answer = [r["name"] for r in rows if r["kind"] == "mechanism" and r["inclusion_probability"] >= 0.5]
-    return {"format_version": 2, "verdict": verdict, "answer": answer, "components": rows, **more}
+    return {"verdict": verdict, "answer": answer, "components": rows, **more}
 
 
 KEY = [
     truth("case_0001", "null"),
     truth("case_0002", "null"),
-    truth("case_0003", "fault", None, "force_drift", "pca_shift"),
-    truth("case_0004", "fault", None, "time_shift"),
+    truth("case_0003", "artefact", None, "force_drift", "pca_shift"),
+    truth("case_0004", "artefact", None, "time_shift"),
     truth("case_0005", "composite", {"viscous_drag": 0.012, "lattice_spacing": 0.03}),
     truth("case_0006", "composite", {"active_titin": 0.02, "forcible_detachment": 0.006}),
     truth("case_0007", "composite", {"weakly_bound_heads": 0.015}),
@@ -78,7 +78,7 @@ SAID: dict[str, dict[str, Any]] = {
     # A family that cannot be resolved is found, but not by name.
     "case_0005": said(
         "physics", {"viscous_drag": 0.98, LENGTH: 0.9},
-        before={"heldout_rmsd_f0": 0.021}, after={"heldout_rmsd_f0": 0.003},
+        before_heldout_f0=0.021, after_heldout_f0=0.003,
     ),
     # The other member of a right family; and a name of a family that is not there.
     "case_0006": said("physics", {"static_calcium_stiffness": 0.9, "weakly_bound_heads": 0.6}),
@@ -91,15 +91,14 @@ SAID: dict[str, dict[str, Any]] = {
 
 def judged_all() -> list[JudgedComposite]:
     """All cases; the tool fails on the last."""
-    return [
-        judge_composite(case, needed(SAID[case["case"]]) if case["case"] in SAID else {"error": "no"}) for case in KEY
-    ]
+    return [judge_composite(case, Answer.read(SAID.get(case["case"], {"error": "no"}))) for case in KEY]
 
 
 @pytest.fixture(scope="module")
 def found() -> dict[str, Score]:
     """Scores by name."""
-    return {s.name: s for s in scores(judged_all())}
+    judged = judged_all()
+    return {s.name: s for s in of_composites(judged, calibration.of_composites(judged))}
 
 
 def test_names_of_the_right_family(found: dict[str, Score]) -> None:
@@ -125,17 +124,17 @@ def test_effects_that_leave_one_per_cent_are_found(found: dict[str, Score]) -> N
 def test_names_on_nulls_and_artefacts(found: dict[str, Score]) -> None:
     assert (found["null_named"].value, found["null_named"].n) == (0.5, 2)
     assert found["null_named"].reached is False
-    assert (found["fault_physics"].value, found["fault_physics"].n) == (0.5, 2)
+    assert (found["artefact_physics"].value, found["artefact_physics"].n) == (0.5, 2)
     assert (found["artefact_found"].value, found["artefact_found"].n) == (pytest.approx(1 / 3), 3)
     assert (found["artefact_names_family"].value, found["artefact_names_family"].n) == (1.0, 1)
     assert found["null_quiet"].value == 0.5
 
 
 def test_a_mechanism_in_the_answer_of_an_artefact_is_physics_whatever_the_verdict() -> None:
-    case = truth("x", "fault", None, "time_shift")
-    assert judge_composite(case, said("ambiguous", {"viscous_drag": 0.6})).physics
-    assert judge_composite(case, {**said("physics", {}), "answer": []}).physics
-    assert not judge_composite(case, said("ambiguous", {"viscous_drag": 0.4})).physics
+    case = truth("x", "artefact", None, "time_shift")
+    assert judge_composite(case, Answer.read(said("ambiguous", {"viscous_drag": 0.6}))).physics
+    assert judge_composite(case, Answer.read({**said("physics", {}), "answer": []})).physics
+    assert not judge_composite(case, Answer.read(said("ambiguous", {"viscous_drag": 0.4}))).physics
 
 
 def test_outside_effects_are_not_named(found: dict[str, Score]) -> None:
@@ -165,7 +164,7 @@ def test_calibration_error_by_hand(found: dict[str, Score]) -> None:
 def test_members_of_a_family_make_one_statement_of_it() -> None:
     """A small probability of the other member says nothing wrong of the family."""
     case = judge_composite(
-        KEY[4], said("physics", {"lattice_spacing": 0.9, "filament_overlap": 0.2, "active_titin": 0.1})
+        KEY[4], Answer.read(said("physics", {"lattice_spacing": 0.9, "filament_overlap": 0.2, "active_titin": 0.1}))
     )
     assert error([by_family(case.statements)]) == pytest.approx((0.1 + 0.8 + 0.1) / 3)
     assert as_families(case.statements) == [Stated(pytest.approx(0.92), True), Stated(pytest.approx(0.1), False)]
@@ -218,7 +217,7 @@ def test_gain_is_of_what_the_true_model_gains(found: dict[str, Score]) -> None:
 
 
 def test_answers_of_the_first_format_count_by_their_names() -> None:
-    case = judge_composite(KEY[4], {"verdict": "physics", "answer": ["viscous_drag", "force_offset"]})
+    case = judge_composite(KEY[4], Answer.read({"verdict": "physics", "answer": ["viscous_drag", "force_offset"]}))
     assert [name.name for name in case.named] == ["viscous_drag"]
     assert [name.name for name in case.artefacts_named] == ["force_offset"]
     assert case.statements == ()
@@ -230,20 +229,21 @@ def test_second_format_in_a_benchmark_of_single_effects() -> None:
         "case": "x", "kind": "single", "labels": ["lattice_spacing"], "size_f0": 0.02, "size_class_f0": 0.02,
         "noise_rms_f0": 0.001, "cells": [],
     }  # fmt: skip
-    by_name = judge(single, needed(said("physics", {"lattice_spacing": 0.95})))
+    by_name = judge(single, Answer.read(said("physics", {"lattice_spacing": 0.95})))
     assert (by_name.exact, by_name.family, by_name.confidence) == (True, True, 0.95)
-    as_family = judge(single, needed(said("physics", {LENGTH: 0.95})))
+    as_family = judge(single, Answer.read(said("physics", {LENGTH: 0.95})))
     assert (as_family.exact, as_family.family, as_family.answer) == (False, True, LENGTH)
-    other = judge(single, needed(said("physics", {"viscous_drag": 0.95, "lattice_spacing": 0.6})))
+    other = judge(single, Answer.read(said("physics", {"viscous_drag": 0.95, "lattice_spacing": 0.6})))
     assert (other.exact, other.family, other.answer) == (False, False, "viscous_drag")
-    fault = {**single, "kind": "fault", "labels": ["force_drift"]}
-    blamed = judge(fault, needed(said("measurement", {"force_drift": 0.8, "viscous_drag": 0.1})))
+    artefact = {**single, "kind": "artefact", "labels": ["force_drift"]}
+    blamed = judge(artefact, Answer.read(said("measurement", {"force_drift": 0.8, "viscous_drag": 0.1})))
     assert (blamed.exact, blamed.physics, blamed.answer) == (True, False, "force_drift")
-    assert judge(fault, needed(said("ambiguous", {"viscous_drag": 0.6}))).physics
+    assert judge(artefact, Answer.read(said("ambiguous", {"viscous_drag": 0.6}))).physics
 
 
 def test_sizes_have_their_classes() -> None:
-    rows = by_size(judged_all())
+    effects = [effect for j in judged_all() for effect in j.effects]
+    rows = by_size(effects, lambda e: e.size_f0, {"family": lambda e: e.family_found})
     assert [(row["from_f0"], row["n"]) for row in rows] == [(0.0, 0), (0.005, 1), (0.01, 2), (0.02, 4), (0.04, 0)]
     assert rows[3]["family"]["value"] == pytest.approx(3 / 4)
 
@@ -261,7 +261,7 @@ def test_confusion_counts_every_effect_once() -> None:
 
 def test_scored_with_figures_and_never_as_single_effects(tmp_path: Path) -> None:
     seal(tmp_path / "r", tmp_path / "key.json", 3, KEY, "about", "gaussian", COMPOSITES)
-    results = {case["case"]: needed(SAID.get(case["case"], SAID["case_0001"])) for case in KEY}
+    results = {case["case"]: SAID.get(case["case"], SAID["case_0001"]) for case in KEY}
     (tmp_path / "r" / RESULTS).write_text(json.dumps({"cases": results}))
     text, files = score(tmp_path / "r", tmp_path / "key.json", tmp_path / "s")
     assert "| nulls with any mechanism named | 50 % | 1 % to 99 % | 2 | ≤ 2 % | no |" in text
@@ -275,4 +275,4 @@ def test_scored_with_figures_and_never_as_single_effects(tmp_path: Path) -> None
         "label": "lattice_spacing", "family": LENGTH, "size_f0": 0.03, "family_found": True, "exact_found": False,
     }  # fmt: skip
     seal(tmp_path / "r", tmp_path / "key.json", 3, [], "about", "gaussian", SINGLES)
-    assert "kind" not in json.loads((tmp_path / "key.json").read_text())
+    assert json.loads((tmp_path / "key.json").read_text())["kind"] == SINGLES

@@ -13,18 +13,17 @@ from scipy.optimize import least_squares
 
 from xb_muscle_ros.cli.main import main
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, MECHANISMS, Name
+from xb_muscle_ros.prove.generator.artefacts import ARTEFACTS, ORDINARY, Artefacts, draw_ordinary, with_artefacts
 from xb_muscle_ros.prove.generator.case import Concealed, dressed
 from xb_muscle_ros.prove.generator.composite import Composite, make_composite
-from xb_muscle_ros.prove.generator.composite_mix import PARTS, CompositeSpec, composite_specs
 from xb_muscle_ros.prove.generator.composite_sizes import Sized
 from xb_muscle_ros.prove.generator.effects import EFFECTS, OUTSIDE
-from xb_muscle_ros.prove.generator.ordinary import ARTEFACTS, ORDINARY, draw_ordinary, with_artefacts
-from xb_muscle_ros.prove.generator.recording import Faults
+from xb_muscle_ros.prove.generator.mix import PARTS, Spec, composites
 from xb_muscle_ros.prove.generator.rest import WORTH, WORTH_SD, Rest
 from xb_muscle_ros.prove.generator.study import Planned, plan
 from xb_muscle_ros.prove.generator.truth import study_forces
 from xb_muscle_ros.prove.generator.world import Mesh, World, isometric
-from xb_muscle_ros.prove.generator.writing import composite_entry
+from xb_muscle_ros.prove.generator.writing import key_entry
 from xb_muscle_ros.prove.sealing import COMPOSITES, digest, load_benchmark
 
 DRAG, TITIN = Name.VISCOUS_DRAG.value, Name.STATIC_CALCIUM_STIFFNESS.value
@@ -34,14 +33,14 @@ COARSE = Mesh(steps=1, dx=0.2)
 @pytest.fixture(scope="module")
 def pair() -> Composite:
     """A case with two mechanisms."""
-    return make_composite(CompositeSpec("composite", (DRAG, TITIN), (0.008, 0.02), (), "3state_coop", 7), 7, 1)
+    return make_composite(Spec("composite", (DRAG, TITIN), (0.008, 0.02), "3state_coop"), 7, 1)
 
 
 @pytest.fixture(scope="module")
-def fault() -> Composite:
+def artefact() -> Composite:
     """A case with an artefact beyond the ordinary."""
     return make_composite(
-        CompositeSpec("fault", (), (), (Name.FORCE_DRIFT.value, Name.PCA_SHIFT.value), "3state_coop", 8), 7, 2
+        Spec("artefact", (), (), "3state_coop", (Name.FORCE_DRIFT.value, Name.PCA_SHIFT.value), 8), 7, 2
     )
 
 
@@ -57,17 +56,17 @@ def planned(worlds: dict[str, World]) -> list[Planned]:
 def test_case_follows_from_its_seed(pair: Composite) -> None:
     again = make_composite(pair.spec, 7, 1)
     assert all(np.array_equal(a, b) for a, b in zip(pair.recorded, again.recorded, strict=True))
-    assert composite_entry(pair, "x") == composite_entry(again, "x")
+    assert key_entry(pair, "x") == key_entry(again, "x")
     null = pair.spec._replace(kind="null", labels=(), sizes=())
     assert make_composite(null, 7, 1).values != make_composite(null, 8, 1).values
 
 
 def test_effects_are_of_the_sizes_meant(pair: Composite) -> None:
     assert pair.sizes == pytest.approx(pair.spec.sizes, rel=0.6)
-    entry = composite_entry(pair, "x")
+    entry = key_entry(pair, "x")
     assert [e["label"] for e in entry["effects"]] == [DRAG, TITIN]
     assert [e["family"] for e in entry["effects"]] == [FAMILY[Name(DRAG)], FAMILY[Name(TITIN)]]
-    assert [e["beside_rest_f0"] for e in entry["effects"]] == pair.sizes
+    assert [e["unique_contribution_f0"] for e in entry["effects"]] == pair.sizes
     assert all(0.003 <= size <= 0.05 for size in pair.sizes)
     # A refit takes up a part.
     assert entry["before_refit_f0"] > max(pair.sizes)
@@ -113,9 +112,9 @@ def test_size_is_what_all_the_rest_cannot_take_up(pair: Composite) -> None:
     assert 0.3 * linear < pair.sizes[0] < 1.15 * linear
 
 
-def test_ordinary_error_is_in_every_case(pair: Composite, fault: Composite) -> None:
-    for case in (pair, fault):
-        ordinary = composite_entry(case, "x")["ordinary"]
+def test_ordinary_error_is_in_every_case(pair: Composite, artefact: Composite) -> None:
+    for case in (pair, artefact):
+        ordinary = key_entry(case, "x")["ordinary_artefact_sizes"]
         assert set(ordinary["pca_shift"]) == {f"{trial.pca:g}" for trial in case.study}
         assert all(shift != 0.0 for shift in ordinary["pca_shift"].values())
         assert len(ordinary["force_offset"]) == len(case.study)
@@ -134,15 +133,15 @@ def test_recording_is_the_fibre_with_its_errors(pair: Composite) -> None:
         assert abs(np.mean(plain)) > 1e-5
 
 
-def test_ordinary_errors_have_their_sizes(planned: list[Planned]) -> None:
+def test_ordinary_artefacts_have_their_sizes(planned: list[Planned]) -> None:
     drawn = [draw_ordinary(np.random.default_rng(seed), planned) for seed in range(300)]
-    shifts = np.array([list(faults.pca_shift.values()) for faults in drawn])
-    offsets = np.array([faults.offset for faults in drawn])
+    shifts = np.array([list(artefacts.pca_shift.values()) for artefacts in drawn])
+    offsets = np.array([artefacts.force_offset for artefacts in drawn])
     assert np.std(shifts) == pytest.approx(ORDINARY[Name.PCA_SHIFT.value], rel=0.1)
     assert np.std(offsets) == pytest.approx(ORDINARY[Name.FORCE_OFFSET.value], rel=0.1)
-    assert np.std([faults.delay_s for faults in drawn]) == pytest.approx(7e-4, rel=0.15)
-    assert np.std([faults.length_gain for faults in drawn]) == pytest.approx(0.01, rel=0.15)
-    run_down = np.array([faults.run_down for faults in drawn])
+    assert np.std([artefacts.time_shift for artefacts in drawn]) == pytest.approx(7e-4, rel=0.15)
+    assert np.std([artefacts.length_gain for artefacts in drawn]) == pytest.approx(0.01, rel=0.15)
+    run_down = np.array([artefacts.run_down for artefacts in drawn])
     assert 0.0 <= run_down.min() < run_down.max() <= 0.003
     # Errors of trials and solutions are their own.
     assert np.all(np.abs(np.corrcoef(offsets.T) - np.eye(len(planned))) < 0.3)
@@ -151,42 +150,42 @@ def test_ordinary_errors_have_their_sizes(planned: list[Planned]) -> None:
 @pytest.mark.parametrize("name", ARTEFACTS)
 def test_artefact_is_beyond_the_ordinary(name: str, planned: list[Planned]) -> None:
     assert set(ARTEFACTS) == {artefact.value for artefact in MEASUREMENT}
-    ordinary = Faults(
+    ordinary = Artefacts(
         {trial.pca: 0.01 for trial in planned}, 0.001, 0.001, tuple(0.001 for _ in planned), (), 1e-4
     )  # fmt: skip
     for seed in range(20):
-        faults = with_artefacts([name], np.random.default_rng(seed), planned, ordinary)
+        artefacts = with_artefacts([name], np.random.default_rng(seed), planned, ordinary)
         beyond = {
-            "pca_shift": max(map(abs, faults.pca_shift.values())) / 0.04,
-            "run_down": faults.run_down / 0.003,
-            "force_offset": max(map(abs, faults.offset)) / 0.003,
-            "force_drift": min(map(abs, faults.drift), default=0.0) / 0.002,
-            "length_gain": abs(faults.length_gain) / 0.01,
-            "time_shift": abs(faults.delay_s) / 7e-4,
-            "transducer_lag": faults.lag_s / 7e-4,
+            "pca_shift": max(map(abs, artefacts.pca_shift.values())) / 0.04,
+            "run_down": artefacts.run_down / 0.003,
+            "force_offset": max(map(abs, artefacts.force_offset)) / 0.003,
+            "force_drift": min(map(abs, artefacts.force_drift), default=0.0) / 0.002,
+            "length_gain": abs(artefacts.length_gain) / 0.01,
+            "time_shift": abs(artefacts.time_shift) / 7e-4,
+            "transducer_lag": artefacts.transducer_lag / 7e-4,
         }
         assert [other for other, size in beyond.items() if size >= 3.0 - 1e-9] == [name]
-        assert (1.0 - faults.run_down) ** (len(planned) - 1) > 0.69
+        assert (1.0 - artefacts.run_down) ** (len(planned) - 1) > 0.69
 
 
-def test_artefacts_leave_something(fault: Composite) -> None:
-    assert fault.artefacts_left is not None
-    left_f0, pulled_sd = fault.artefacts_left
-    assert left_f0 >= 0.0015 or pulled_sd >= 2.5
-    entry = composite_entry(fault, "x")
+def test_artefacts_leave_something(artefact: Composite) -> None:
+    assert artefact.artefact_residual is not None
+    residual_f0, prior_residual_sd = artefact.artefact_residual
+    assert residual_f0 >= 0.0015 or prior_residual_sd >= 2.5
+    entry = key_entry(artefact, "x")
     assert entry["labels"] == entry["artefacts"] == ["force_drift", "pca_shift"]
     assert entry["effects"] == []
-    assert entry["faults"]["force_drift"] != entry["ordinary"]["force_drift"]
-    assert entry["faults"]["force_offset"] == entry["ordinary"]["force_offset"]
+    assert entry["artefact_sizes"]["force_drift"] != entry["ordinary_artefact_sizes"]["force_drift"]
+    assert entry["artefact_sizes"]["force_offset"] == entry["ordinary_artefact_sizes"]["force_offset"]
 
 
 def test_rest_takes_up_what_it_has_and_no_more() -> None:
     columns = 0.02 * np.random.default_rng(1).standard_normal((4000, 3))
-    taken = Rest(columns, 7).take(columns @ [0.5, 0.0, -0.2])
+    taken = Rest(columns, 7).fit(columns @ [0.5, 0.0, -0.2])
     assert taken.rms < 1e-4
-    assert taken.pulled == pytest.approx([0.5, 0.0, -0.2], abs=0.02)
-    assert Rest(columns[:, 1:], 7).take(0.5 * columns[:, 0]).rms == pytest.approx(0.01, rel=0.05)
-    assert np.isnan(Rest(columns, 7).take(np.full(4000, np.inf)).rms)
+    assert taken.prior_residual == pytest.approx([0.5, 0.0, -0.2], abs=0.02)
+    assert Rest(columns[:, 1:], 7).fit(0.5 * columns[:, 0]).rms == pytest.approx(0.01, rel=0.05)
+    assert np.isnan(Rest(columns, 7).fit(np.full(4000, np.inf)).rms)
 
 
 def test_refit_finds_the_least_of_a_bent_valley() -> None:
@@ -204,9 +203,9 @@ def test_refit_finds_the_least_of_a_bent_valley() -> None:
     weight = np.sqrt(WORTH * 7 / time.size) / WORTH_SD
     other = least_squares(lambda at: np.concatenate([weight * (data - model(at)), at]), np.zeros(3))
     found = Rest(slopes(np.zeros(3)), 7).refit(data, model, slopes, 2, 3)
-    assert found.pulled == pytest.approx(other.x, abs=0.02)
+    assert found.prior_residual == pytest.approx(other.x, abs=0.02)
     assert found.rms == pytest.approx(np.sqrt(np.mean((data - model(other.x)) ** 2)), rel=0.01)
-    assert found.left == pytest.approx(data - model(found.pulled))
+    assert found.residual == pytest.approx(data - model(found.prior_residual))
 
 
 def test_ordinary_error_leaves_next_to_nothing(worlds: dict[str, World], planned: list[Planned]) -> None:
@@ -215,21 +214,22 @@ def test_ordinary_error_leaves_next_to_nothing(worlds: dict[str, World], planned
     ordinary = draw_ordinary(np.random.default_rng(1), study)
     sized = Sized(worlds["3state_coop"], study, ordinary)
     shifted = replace(ordinary, pca_shift={pca: shift + 0.03 for pca, shift in ordinary.pca_shift.items()})
-    moved = replace(ordinary, offset=tuple(offset + 0.004 for offset in ordinary.offset))
-    drifting = replace(ordinary, drift=tuple(0.02 * (-1) ** i for i in range(len(study))))
-    assert sized.of_faults(shifted).rms < 1e-3
-    assert sized.of_faults(moved).rms < 3e-4
-    assert sized.of_faults(drifting).rms > 3e-3
+    moved = replace(ordinary, force_offset=tuple(offset + 0.004 for offset in ordinary.force_offset))
+    drifting = replace(ordinary, force_drift=tuple(0.02 * (-1) ** i for i in range(len(study))))
+    assert sized.of_artefacts(shifted).rms < 1e-3
+    assert sized.of_artefacts(moved).rms < 3e-4
+    assert sized.of_artefacts(drifting).rms > 3e-3
 
 
 def test_mix_has_every_kind() -> None:
-    made = composite_specs(200, 3)
-    assert made == composite_specs(200, 3)
-    assert made != composite_specs(200, 4)
+    made = composites(200, 3)
+    assert made == composites(200, 3)
+    assert made != composites(200, 4)
     kinds = collections.Counter((spec.kind, len(spec.labels), len(spec.artefacts)) for spec in made)
     assert kinds == {
-        ("null", 0, 0): 30, ("fault", 0, 1): 16, ("fault", 0, 2): 14, ("composite", 1, 0): 40, ("composite", 2, 0): 40,
-        ("composite", 3, 0): 24, ("composite", 4, 0): 16, ("outside", 1, 0): 10, ("outside", 2, 0): 10,
+        ("null", 0, 0): 30, ("artefact", 0, 1): 16, ("artefact", 0, 2): 14, ("composite", 1, 0): 40,
+        ("composite", 2, 0): 40, ("composite", 3, 0): 24, ("composite", 4, 0): 16,
+        ("outside", 1, 0): 10, ("outside", 2, 0): 10,
     }  # fmt: skip
     assert sum(part.share for part in PARTS) == pytest.approx(1.0)
     for spec in made:
@@ -262,8 +262,8 @@ def test_study_of_many_trials(trials: int, levels: int, worlds: dict[str, World]
 
 
 def test_make_composites(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    null = CompositeSpec("null", (), (), (), "2state", 7)
-    monkeypatch.setattr("xb_muscle_ros.prove.generator.composite_mix.composite_specs", lambda cases, seed: [null])
+    null = Spec("null", (), (), "2state")
+    monkeypatch.setattr("xb_muscle_ros.prove.generator.mix.composites", lambda cases, seed: [null])
     key, out = tmp_path / "key.json", tmp_path / "b"
     command = ["prove", "make", "--kind", COMPOSITES, "--cases", "1", "--seed", "3", "--out", str(out)]
     command += ["--processes", "0", "--key", str(key)]

@@ -96,6 +96,6 @@ def test_inactivation_wears_off(worlds: dict[str, World]) -> None:
     length = np.interp(np.arange(8000), [0, 200, 300, 8000], [0.0, 0.0, 0.04, 0.04])
     study = [Stimulus(length, 1.0)]
     plain = Truth(worlds["3state_coop"])
-    force = study_forces(effect.apply(plain, 2.0, {"memory_s": 1.0}), study)[0] - study_forces(plain, study)[0]
+    force = study_forces(effect.apply(plain, 2.0, {"decay_s": 1.0}), study)[0] - study_forces(plain, study)[0]
     assert force[800] < -5e-3
     assert abs(force[-1]) < 0.05 * abs(force[800])

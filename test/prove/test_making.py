@@ -11,12 +11,13 @@ import pytest
 from xb_muscle_ros.cli.main import main
 from xb_muscle_ros.diagnose.names import MEASUREMENT, MECHANISMS, Name
 from xb_muscle_ros.models.fibre_file import load_fibre
-from xb_muscle_ros.prove.generator.case import Case, make_case, size_class
+from xb_muscle_ros.prove.generator.artefacts import PRIORS, Artefacts, draw_artefact
 from xb_muscle_ros.prove.generator.effects import OUTSIDE
 from xb_muscle_ros.prove.generator.layout import At
-from xb_muscle_ros.prove.generator.mix import SIZES, Spec, specs
-from xb_muscle_ros.prove.generator.recording import PRIORS, Faults, draw_faults, noise
+from xb_muscle_ros.prove.generator.mix import SIZES, Spec, singles
+from xb_muscle_ros.prove.generator.noise import noise
 from xb_muscle_ros.prove.generator.refit import Refit
+from xb_muscle_ros.prove.generator.single import Single, make_single, size_class
 from xb_muscle_ros.prove.generator.truth import Truth, study_forces
 from xb_muscle_ros.prove.generator.world import Stimulus, World
 from xb_muscle_ros.prove.generator.writing import key_entry, write_case
@@ -25,12 +26,12 @@ from xb_muscle_ros.trials.bags import find_bags, read_trial
 
 
 @pytest.fixture(scope="module")
-def case() -> Case:
+def case() -> Single:
     """A case with something concealed."""
-    return make_case(Spec("single", (Name.STATIC_CALCIUM_STIFFNESS.value,), 0.01, "3state_coop"), 7, 1)
+    return make_single(Spec("single", (Name.STATIC_CALCIUM_STIFFNESS.value,), (0.01,), "3state_coop"), 7, 1)
 
 
-def test_case_is_of_the_size_asked_for(case: Case) -> None:
+def test_case_is_of_the_size_asked_for(case: Single) -> None:
     assert case.refitted.rms == pytest.approx(0.01, rel=0.15)
     assert case.before > case.refitted.rms
     entry = key_entry(case, "case_0001")
@@ -40,13 +41,13 @@ def test_case_is_of_the_size_asked_for(case: Case) -> None:
     assert {4.5, 9.0} <= set(entry["pca"].values())
 
 
-def test_case_follows_from_its_seed(case: Case) -> None:
-    again = make_case(case.spec, 7, 1)
+def test_case_follows_from_its_seed(case: Single) -> None:
+    again = make_single(case.spec, 7, 1)
     assert all(np.array_equal(a, b) for a, b in zip(case.recorded, again.recorded, strict=True))
     assert key_entry(case, "x") == key_entry(again, "x")
 
 
-def test_case_tells_nothing_but_what_was_recorded(case: Case, tmp_path: Path) -> None:
+def test_case_tells_nothing_but_what_was_recorded(case: Single, tmp_path: Path) -> None:
     write_case(tmp_path / "case_0001", case, "fibre_0001", "gaussian")
     words = [name.value for name in (*MECHANISMS, *MEASUREMENT)] + [label.removeprefix("outside:") for label in OUTSIDE]
     words += ["single", "outside", "conceal", "effect", case.fibre, '"scale"']
@@ -85,14 +86,14 @@ def test_refit_goes_through_a_long_valley(worlds: dict[str, World], study: list[
 
 
 def test_mix_has_every_kind_and_mechanism() -> None:
-    made = specs(200, 3)
-    assert made == specs(200, 3)
-    assert made != specs(200, 4)
+    made = singles(200, 3)
+    assert made == singles(200, 3)
+    assert made != singles(200, 4)
     kinds = collections.Counter(spec.kind for spec in made)
-    assert kinds == {"null": 40, "fault": 40, "single": 80, "pair": 20, "outside": 20}
-    singles = collections.Counter(spec.labels[0] for spec in made if spec.kind == "single")
-    assert set(singles) == {name.value for name in MECHANISMS}
-    assert max(singles.values()) - min(singles.values()) <= 1
+    assert kinds == {"null": 40, "artefact": 40, "single": 80, "pair": 20, "outside": 20}
+    by_label = collections.Counter(spec.labels[0] for spec in made if spec.kind == "single")
+    assert set(by_label) == {name.value for name in MECHANISMS}
+    assert max(by_label.values()) - min(by_label.values()) <= 1
     sizes = collections.Counter(spec.size for spec in made if spec.kind == "single")
     assert set(sizes) == set(SIZES)
     assert max(sizes.values()) - min(sizes.values()) <= 4
@@ -105,19 +106,19 @@ def test_class_is_the_highest_that_is_reached() -> None:
 
 
 @pytest.mark.parametrize("name", PRIORS)
-def test_fault_changes_the_recording(name: str, case: Case) -> None:
-    assert set(PRIORS) == {fault.value for fault in MEASUREMENT}
-    faults = draw_faults(name, np.random.default_rng(1), case.study)
+def test_artefact_changes_the_recording(name: str, case: Single) -> None:
+    assert set(PRIORS) == {artefact.value for artefact in MEASUREMENT}
+    artefacts = draw_artefact(name, np.random.default_rng(1), case.study)
     force = np.interp(np.arange(500), [0, 100, 200, 500], [0.2, 0.2, 0.5, 0.3])
-    changed = faults.pca_shift or faults.length_gain or not np.array_equal(faults.recorded(force, 3), force)
+    changed = artefacts.pca_shift or artefacts.length_gain or not np.array_equal(artefacts.recorded(force, 3), force)
     assert changed
-    assert np.array_equal(Faults().recorded(force, 3), force)
+    assert np.array_equal(Artefacts().recorded(force, 3), force)
 
 
 def test_lag_and_delay_put_force_behind() -> None:
     ramp = np.maximum(np.arange(300) - 100.0, 0.0) * 1e-3
-    for faults in (Faults(lag_s=0.003), Faults(delay_s=0.003)):
-        assert ramp[-1] - faults.recorded(ramp, 0)[-1] == pytest.approx(0.003, abs=1e-6)
+    for artefacts in (Artefacts(transducer_lag=0.003), Artefacts(time_shift=0.003)):
+        assert ramp[-1] - artefacts.recorded(ramp, 0)[-1] == pytest.approx(0.003, abs=1e-6)
 
 
 def test_noise_is_slow_and_small() -> None:

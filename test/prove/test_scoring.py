@@ -15,14 +15,17 @@ from sample_diagnoses import nothing
 from xb_muscle_ros.cli.main import main
 from xb_muscle_ros.diagnose.component import Component, Kind
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
-from xb_muscle_ros.diagnose.result import Diagnosis, Place, Verdict
+from xb_muscle_ros.diagnose.residual import Place
+from xb_muscle_ros.diagnose.result import Diagnosis, Verdict
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.prove.counting import interval, scores
+from xb_muscle_ros.prove.answers import Answer
+from xb_muscle_ros.prove.counting import interval, of_singles
 from xb_muscle_ros.prove.judging import judge
 from xb_muscle_ros.prove.make import seal
 from xb_muscle_ros.prove.run import RESULTS, run
 from xb_muscle_ros.prove.score import score
 from xb_muscle_ros.prove.score_figures import confusion
+from xb_muscle_ros.prove.sealing import KINDS, digest, load_benchmark
 from xb_muscle_ros.work import Options
 
 CELLS = [
@@ -50,8 +53,8 @@ def said(verdict: str, *answer: str, where: tuple[str, str] | None = None, **mor
 KEY = [
     truth("case_0001", "null"),
     truth("case_0002", "null"),
-    truth("case_0003", "fault", "force_drift"),
-    truth("case_0004", "fault", "time_shift"),
+    truth("case_0003", "artefact", "force_drift"),
+    truth("case_0004", "artefact", "time_shift"),
     truth("case_0005", "single", "viscous_drag", size=0.02),
     truth("case_0006", "single", "lattice_spacing", size=0.04),
     truth("case_0007", "single", "active_titin", size=0.005),
@@ -76,14 +79,14 @@ SAID = {
 
 
 def test_scores_of_known_results() -> None:
-    judged = [judge(case, SAID[case["case"]]) for case in KEY]
-    found = {s.name: s for s in scores(judged)}
+    judged = [judge(case, Answer.read(SAID[case["case"]])) for case in KEY]
+    found = {s.name: s for s in of_singles(judged)}
     expected = {
-        "null_physics": (0.5, 2), "fault_physics": (0.5, 2), "large_family": (1.0, 2), "large_exact": (0.5, 2),
+        "null_physics": (0.5, 2), "artefact_physics": (0.5, 2), "large_family": (1.0, 2), "large_exact": (0.5, 2),
         "precision_family": (2 / 3, 3), "precision_exact": (2 / 3, 3), "outside_abstains": (1.0, 1),
         "located": (0.75, 4), "located_beside_nuisances": (0.75, 4), "gain": (0.9, 1), "coverage": (0.4, 5),
-        "fault_exact": (0.0, 2), "fault_family": (0.5, 2), "null_quiet": (0.5, 2), "pair_first": (1.0, 1),
-        "mismatch_found": (2 / 3, 6), "failed": (0.0, 10),
+        "artefact_exact": (0.0, 2), "artefact_family": (0.5, 2), "null_quiet": (0.5, 2), "pair_first": (1.0, 1),
+        "mismatch_found": (2 / 3, 6), "worse": (0.0, 1), "failed": (0.0, 10),
     }  # fmt: skip
     for name, (value, n) in expected.items():
         assert (found[name].value, found[name].n) == (pytest.approx(value), n), name
@@ -93,12 +96,15 @@ def test_scores_of_known_results() -> None:
 
 
 def test_failure_of_the_tool_is_no_right_answer() -> None:
-    judged = judge(KEY[4], {"error": "no such bag"})
+    judged = judge(KEY[4], Answer.read({"error": "no such bag"}))
     assert (judged.verdict, judged.exact, judged.family, judged.located) == ("error", False, False, None)
 
 
 def test_untouched_recordings_have_no_truth_to_confuse() -> None:
-    judged = [judge(truth("case_0001", "untouched"), said("unexplained")), judge(KEY[4], SAID["case_0005"])]
+    judged = [
+        judge(truth("case_0001", "untouched"), Answer.read(said("unexplained"))),
+        judge(KEY[4], Answer.read(SAID["case_0005"])),
+    ]
     assert confusion(judged).sum() == 1.0
 
 
@@ -176,6 +182,42 @@ def test_run_then_score(benchmark_folder: Path, monkeypatch: pytest.MonkeyPatch)
     tree = json.loads((benchmark_folder / "s" / "scores.json").read_text())
     assert tree["scores"]["gain"]["value"] == pytest.approx(0.9)
     assert tree["scores"]["failed"]["value"] == pytest.approx(0.1)
+
+
+def test_an_answer_worse_than_the_base_is_counted() -> None:
+    rows = [said("physics", "viscous_drag", before_heldout_f0=0.02, after_heldout_f0=after) for after in (0.03, 0.01)]
+    found = {s.name: s for s in of_singles([judge(KEY[4], Answer.read(row)) for row in rows])}
+    assert (found["worse"].value, found["worse"].n) == (0.5, 2)
+
+
+@pytest.mark.parametrize("run", ["release_1", "release_2", "release_3", "release_4", "composites_1"])
+def test_results_of_published_runs_are_read(run: str) -> None:
+    folder = Path(__file__).parents[2] / "docs" / "benchmark" / run
+    rows = json.loads((folder / RESULTS).read_text(encoding="utf-8"))["cases"]
+    verdicts = {*(verdict.value for verdict in Verdict), "error"}
+    for row in rows.values():
+        found = Answer.read(row)
+        assert found.verdict in verdicts
+        assert found.names == tuple(row.get("answer", ()))
+        assert (found.mechanisms is None) == ("components" not in row)
+        assert {s.name for s in found.named_mechanisms} <= set(found.names)
+    assert load_benchmark(folder)["cases"] == sorted(rows)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_key_of_the_former_version_is_scored(kind: str, tmp_path: Path) -> None:
+    """`key_2.json`: open cases, results and scores by the version that wrote keys of version 2."""
+    held = json.loads((Path(__file__).parent / "key_2.json").read_text(encoding="utf-8"))[kind]
+    key = tmp_path / "key.json"
+    key.write_text(json.dumps(held["key"]))
+    cases = [case["case"] for case in held["key"]["cases"]]
+    benchmark = {"version": 2, "kind": kind, "cases": cases, "key_sha256": digest(key)}
+    (tmp_path / "r").mkdir()
+    (tmp_path / "r" / "benchmark.json").write_text(json.dumps(benchmark))
+    (tmp_path / "r" / RESULTS).write_text(json.dumps({"cases": held["results"]}))
+    score(tmp_path / "r", key, tmp_path / "s")
+    found = json.loads((tmp_path / "s" / "scores.json").read_text())["scores"]
+    assert {name: found[name]["value"] for name in held["scores"]} == pytest.approx(held["scores"])
 
 
 def test_another_key_is_refused(benchmark_folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

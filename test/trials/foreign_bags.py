@@ -16,7 +16,8 @@ from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.completing import Known
 from xb_muscle_ros.trials.custom_data import facts_to_custom_data
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
-from xb_muscle_ros.trials.ros_types import CALCIUM, FORCE, LENGTH, MEASURED_FORCE, joint_state, to_ns
+from xb_muscle_ros.trials.ros_types import CALCIUM, FORCE, LENGTH, MEASURED_FORCE, joint_state
+from xb_muscle_ros.trials.stamps import to_ns
 from xb_muscle_ros.trials.study import Study, read_study
 from xb_muscle_ros.trials.trial import Array, Trial
 

@@ -18,6 +18,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bags import Simulated, read_simulated, read_trial, write_trial
 from xb_muscle_ros.trials.simulated import MOMENTS
+from xb_muscle_ros.trials.stamps import to_ns, to_s
 from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -72,7 +73,7 @@ def test_round_trip_is_bit_exact(made: Trial) -> None:
 @settings(deadline=None)
 @given(st.integers(0, 2 * 10**15))
 def test_a_stamp_survives_the_trip_through_seconds(stamp_ns: int) -> None:
-    assert ros_types.to_ns(ros_types.to_s(np.array([stamp_ns])))[0] == stamp_ns
+    assert to_ns(to_s(np.array([stamp_ns])))[0] == stamp_ns
 
 
 def test_simulated_comes_back(tmp_path: Path, trial: Trial, simulated: Simulated) -> None:

@@ -23,8 +23,8 @@ from xb_muscle_ros.trials.importing import (
     bag_name,
     find_recordings,
     import_recordings,
+    recorded_provenance,
 )
-from xb_muscle_ros.trials.provenance import recorded_provenance
 from xb_muscle_ros.trials.readers.settings import ImportSettings
 from xb_muscle_ros.trials.trial import Trial
 

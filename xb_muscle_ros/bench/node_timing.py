@@ -15,7 +15,7 @@ def figures(duration_s: float, rate_hz: float, priority: int = 0) -> list[Figure
     Raises:
         UserError: a node does not start or stops early.
     """
-    from xb_muscle_ros.node.timing import run_beside_plain_timer
+    from xb_muscle_ros.bench.timing import run_beside_plain_timer
 
     settings = {"realtime_priority": priority, "lock_memory": priority > 0}
     ours, plain = run_beside_plain_timer(duration_s, rate_hz, settings=settings)
@@ -29,7 +29,7 @@ def roundtrip_figures(duration_s: float, rate_hz: float) -> list[Figure]:
     Raises:
         UserError: see `figures`.
     """
-    from xb_muscle_ros.node.timing import run_roundtrip
+    from xb_muscle_ros.bench.timing import run_roundtrip
 
     return _of_answers(f"round trip, {rate_hz:g} Hz for {duration_s:g} s", run_roundtrip(duration_s, rate_hz))
 
@@ -40,7 +40,7 @@ def many_figures(duration_s: float, rate_hz: float, fibres: int, priority: int =
     Raises:
         UserError: see `figures`.
     """
-    from xb_muscle_ros.node.timing import run_roundtrip, run_timing
+    from xb_muscle_ros.bench.timing import run_roundtrip, run_timing
 
     name = f"{fibres} fibres, {rate_hz:g} Hz for {duration_s:g} s"
     settings = {"realtime_priority": priority, "lock_memory": priority > 0}

@@ -9,6 +9,7 @@ import time
 from types import FrameType
 from typing import Any
 
+import numpy as np
 import rclpy
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -23,10 +24,10 @@ from std_srvs.srv import Trigger
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Array, Muscle
 from xb_muscle_ros.node.inlet import Inlet
-from xb_muscle_ros.node.inputs import Counts, length_change_l0, scale_of
 from xb_muscle_ros.node.lateness import Lateness, LatenessSummary
 from xb_muscle_ros.node.outputs import OutputMessages
 from xb_muscle_ros.node.reporter import Reporter
+from xb_muscle_ros.node.rules import Counts, Trouble, length_change_l0, scale_of
 from xb_muscle_ros.node.status import Account, Status
 
 
@@ -74,13 +75,13 @@ class PlainTimer(Node):
         super().__init__("plain_timer", automatically_declare_parameters_from_overrides=True)
         fibre = load_fibre(str(self.get_parameter("fiber_file").value))
         self._muscle = Muscle(fibre)
-        self._scale = scale_of(fibre)
+        self._scale = np.array([scale_of(fibre)])
         self._period = round(1e9 / float(self.get_parameter("rate_hz").value))
         newest = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
         force, moments = (self.create_publisher(JointState, f"muscle/{topic}", 100) for topic in ("force", "moments"))
-        outlet = OutputMessages(fibre.name, force, moments)
+        outlet = OutputMessages([fibre.name], force, moments)
         self._emit = outlet.publish
-        inlet = Inlet(fibre.name, self, self.get_logger())
+        inlet = Inlet([fibre.name], self, self.get_logger())
         inlet.open = True
         self.create_subscription(JointState, "muscle/calcium", inlet.take_calcium, newest)
         self.create_subscription(JointState, "muscle/length", inlet.take_length, newest)
@@ -98,15 +99,17 @@ class PlainTimer(Node):
         self._timer = self.create_timer(self._period * 1e-9, self._on_timer, clock=self._steady)
         self.create_timer(1.0, lambda: self._reporter.report("active", time.monotonic(), 0.0), clock=self._steady)
 
-    def take_calcium(self, stamp: int, calcium_um: float) -> None:
+    def take_calcium(self, stamp: int, fibres: Any, calcium_um: Array) -> list[Trouble]:
         """Free calcium, µM."""
-        del stamp
-        self._calcium = calcium_um
+        del stamp, fibres
+        self._calcium = float(calcium_um[0])
+        return []
 
-    def take_length(self, stamp: int, position_m: float, velocity_m_per_s: float | None) -> None:
+    def take_length(self, stamp: int, fibres: Any, position_m: Array, velocity_m_per_s: Array | None) -> list[Trouble]:
         """Fibre length, m."""
-        del stamp, velocity_m_per_s
-        self._change = length_change_l0(position_m, self._scale)
+        del stamp, fibres, velocity_m_per_s
+        self._change = float(length_change_l0(position_m[0], self._scale[0, 0]))
+        return []
 
     def status(self) -> Status:
         """How late timers were."""
@@ -128,7 +131,7 @@ class PlainTimer(Node):
         self._state = self._muscle.step(self._state, self._change, self._calcium, self._period * 1e-9)
         self._ticks += 1
         stamp = int(self.get_clock().now().nanoseconds)
-        self._emit(stamp, self._muscle.outputs(self._state), self._scale)
+        self._emit(stamp, None, np.array([self._muscle.outputs(self._state)]), self._scale)
 
     def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._forget()

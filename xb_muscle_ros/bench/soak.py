@@ -14,7 +14,6 @@ import numpy.typing as npt
 from xb_muscle_ros.bench.measure import Figure
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.progress import Progress
 from xb_muscle_ros.trials.trial import Trial, TrialFacts
 
@@ -146,18 +145,15 @@ def soak(fibre: Fibre, ticks: int, seed: int = 1) -> Soak:
     Raises:
         UserError: a sample was refused or integration failed.
     """
+    from xb_muscle_ros.models.batch import MuscleBatch
     from xb_muscle_ros.node.inlet import Inlet
-    from xb_muscle_ros.node.inputs import scale_of
     from xb_muscle_ros.node.lockstep import Lockstep
     from xb_muscle_ros.node.outputs import OutputMessages
 
     force, moments = _Collector(("effort", "position")), _Collector(("position",))
-    scale = scale_of(fibre)
     log = _Log()
-    lockstep = Lockstep(
-        Muscle(fibre), scale, OutputMessages(fibre.name, force, moments).publish, log, simulated_time=lambda: False
-    )
-    inlet = Inlet(fibre.name, lockstep, log)
+    outlet = OutputMessages([fibre.name], force, moments)
+    inlet = Inlet([fibre.name], Lockstep(MuscleBatch([fibre]), outlet.publish, log, lambda: False), log)
     inlet.open = True
     balance = Balance(fibre)
     sender = _Sender(fibre.name, inlet)
@@ -204,8 +200,8 @@ def soak_over_dds(fibre: Fibre, ticks: int, seed: int = 2) -> tuple[float, float
     """
     import time
 
-    from xb_muscle_ros.node.player import play_live
-    from xb_muscle_ros.node.process import NodeProcess, private_domain
+    from xb_muscle_ros.node.client.player import play_live
+    from xb_muscle_ros.node.client.process import NodeProcess, private_domain
 
     worst, seconds = 0.0, 0.0
     balance = Balance(fibre)
@@ -298,26 +294,23 @@ class _Sender:
     def __init__(self, fibre: str, inlet: Any) -> None:
         from sensor_msgs.msg import JointState
 
-        from xb_muscle_ros.node.outputs import room
-
         self._inlet = inlet
-        self._message = JointState(name=[fibre])
-        self._position = room(self._message, "position", 1)
+        self._message = JointState(name=[fibre], position=[0.0])
 
-    def _fill(self, stamp: int, value: float) -> None:
-        header = self._message.header.stamp
-        header.sec, header.nanosec = divmod(stamp, 1_000_000_000)
-        self._position[0] = value
+    def _filled(self, stamp: int, value: float) -> Any:
+        from xb_muscle_ros.node.outputs import set_stamp
+
+        set_stamp(self._message, stamp)
+        self._message.position[0] = value
+        return self._message
 
     def calcium(self, stamp: int, calcium_um: float) -> None:
         """Free calcium, µM."""
-        self._fill(stamp, calcium_um)
-        self._inlet.take_calcium(self._message)
+        self._inlet.take_calcium(self._filled(stamp, calcium_um))
 
     def length(self, stamp: int, length_m: float) -> None:
         """Fibre length, m."""
-        self._fill(stamp, length_m)
-        self._inlet.take_length(self._message)
+        self._inlet.take_length(self._filled(stamp, length_m))
 
 
 class _Log:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
@@ -27,4 +27,10 @@ def run(arguments: argparse.Namespace) -> int:
     """Do it."""
     from xb_muscle_ros.replay.demo import demo
 
-    return demo(arguments.recordings, arguments.out, live=not arguments.no_live)
+    def timing(*args: Any, **options: Any) -> dict[str, float]:
+        # Needs ROS, which is there where this is called.
+        from xb_muscle_ros.bench.timing import run_timing
+
+        return run_timing(*args, **options)
+
+    return demo(arguments.recordings, arguments.out, not arguments.no_live, timing)

@@ -221,10 +221,10 @@ def _start(
 def _nuisances(given: list[str] | None, training: Sequence[FitTrial]) -> tuple[list[str], dict[str, float], list[str]]:
     """Names of faults, standard deviations of those that the user gave one, and lines on what is left out."""
     from xb_muscle_ros.fit.ordinary import shown_by
-    from xb_muscle_ros.measurement.faults import FAULTS
+    from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 
     ordinary, unseen = shown_by(training)
-    sets: dict[str, Sequence[str]] = {"all": tuple(FAULTS), "ordinary": ordinary, "none": ()}
+    sets: dict[str, Sequence[str]] = {"all": tuple(ARTEFACTS), "ordinary": ordinary, "none": ()}
     names: list[str] = []
     sds: dict[str, float] = {}
     for text in ["ordinary"] if given is None else given:

@@ -54,9 +54,8 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.errors import UserError
     from xb_muscle_ros.files import matching, refuse_older
     from xb_muscle_ros.plant.figure import draw_loop
-    from xb_muscle_ros.plant.loop import DURATION_S, run_ankle, run_knee
+    from xb_muscle_ros.plant.loop import DURATION_S, Muscles, in_process, run_ankle, run_knee
     from xb_muscle_ros.plant.plant import Plant
-    from xb_muscle_ros.plant.reach import beyond_in
     from xb_muscle_ros.plant.report import table, write
     from xb_muscle_ros.plant.translation import RampAndHold
 
@@ -83,29 +82,25 @@ def run(arguments: argparse.Namespace) -> int:
     settings["live"] = arguments.live
     settings["tendon"] = "elastic" if elastic else "rigid"
     fibres = _fibres(arguments.fiber, arguments.models)
-    # The one place where this command touches ROS, and only when asked to.
+    muscles: Muscles = in_process
     if arguments.live:
-        from xb_muscle_ros.plant.live import run_ankle_live, run_knee_live
+        # The one place where this command touches ROS, and only when asked to.
+        from xb_muscle_ros.plant.live import over_ros
+
+        muscles = over_ros()
     if scene == "ankle":
         settings["platform"] = vars(platform)
-        if arguments.live:
-            traces = [run_ankle_live(fibre, platform, duration, elastic) for fibre in fibres if fibre is not None]
-        else:
-            traces = [run_ankle(fibre, platform, duration, elastic) for fibre in fibres]
+        traces = [run_ankle(fibre, platform, duration, elastic, muscles) for fibre in fibres]
         way = "backwards" if platform.displacement_m < 0.0 else "forwards"
         title = (
             f"Platform moves {100 * abs(platform.displacement_m):g} cm {way}, {platform.speed_m_per_s:g} m/s, "
             f"{platform.acceleration_m_per_s2:g} m/s²"
         )
     else:
-        if arguments.live:
-            given_fibres = [fibre for fibre in fibres if fibre is not None]
-            traces = [run_knee_live(f, moved, duration, elastic) for moved in (False, True) for f in given_fibres]
-        else:
-            traces = [run_knee(fibre, moved, duration, elastic) for moved in (False, True) for fibre in fibres]
+        traces = [run_knee(fibre, moved, duration, elastic, muscles) for moved in (False, True) for fibre in fibres]
         title = "Leg released from level"
     for trace in traces:
-        if said := beyond_in(trace):
+        if said := trace.beyond:
             warn(said)
     print(table(traces))
     draw_loop(arguments.out / "loop.png", traces, f"{title}; {settings['tendon']} tendons")

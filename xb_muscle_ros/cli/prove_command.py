@@ -31,7 +31,7 @@ def add(subparsers: Subparsers) -> None:
     make.add_argument(
         "--kind", choices=KINDS, default=SINGLES,
         help="singles: at most one thing or a pair is concealed; composites: up to four mechanisms, each case with "
-        "ordinary error of the measurement (default: singles)",
+        "ordinary measurement artefacts (default: singles)",
     )  # fmt: skip
     make.add_argument("--method", default="gaussian", help="method that the fibre files name (default: gaussian)")
     add_overwrite(make)

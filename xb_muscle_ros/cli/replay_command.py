@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     player: Player | None = None
     if arguments.live:
         # The one place where this command touches ROS, and only when asked to.
-        from xb_muscle_ros.node.player import play_live
+        from xb_muscle_ros.node.client.player import play_live
 
         player = play_live
     results = replay(trials, fibre, player, arguments.substeps, arguments.settle)

@@ -76,7 +76,7 @@ class OfFibre:
     Attributes:
         fibre: name.
         inclusion_probability: from this fibre's recordings alone.
-        share_of_mismatch: of this fibre's.
+        ablation_loss: of this fibre's.
         heldout_gain: None where nothing could be left out.
         parameters: estimates in this fibre.
         replication: log Bayes factor for the component by this fibre's recordings, given those of all other fibres;
@@ -85,7 +85,7 @@ class OfFibre:
 
     fibre: str
     inclusion_probability: float
-    share_of_mismatch: float
+    ablation_loss: float
     heldout_gain: HeldOutGain | None
     parameters: tuple[Parameter, ...]
     replication: float | None = None
@@ -106,7 +106,7 @@ class Component:
         family: of `names.FAMILY`.
         members: names in it, the likeliest first; a single name: itself.
         inclusion_probability: that it, or one of its members, is part of the truth.
-        share_of_mismatch: ablation loss as a share of the base's mismatch (0 where it is not part of the answer).
+        ablation_loss: ablation loss as a share of the base's mismatch (0 where it is not part of the answer).
         heldout_gain: what is lost without it on held-out conditions; None where it was not tried.
         parameters: of the likeliest member.
         direction: what it does to the force, in plain words; empty where it is not part of the answer.
@@ -121,7 +121,7 @@ class Component:
     family: str
     members: tuple[str, ...]
     inclusion_probability: float
-    share_of_mismatch: float = 0.0
+    ablation_loss: float = 0.0
     heldout_gain: HeldOutGain | None = None
     parameters: tuple[Parameter, ...] = ()
     direction: str = ""

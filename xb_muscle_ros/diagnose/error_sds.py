@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS, ORDINARY
 
 # An SD this share of the usual one is as good as none.
 _LEAST = 1e-3
@@ -41,14 +41,14 @@ def told_of(error_sds: Mapping[str, float]) -> list[str]:
     """
     lines = []
     for name, sd in error_sds.items():
-        if name in FAULTS and name not in ORDINARY:
+        if name in ARTEFACTS and name not in ORDINARY:
             raise UserError(
                 f"--nuisance: '{name}' is a candidate of every diagnosis and no ordinary error; SDs are of "
                 f"{', '.join(ORDINARY)}"
             )
         if name not in ORDINARY:
             raise UserError(f"--nuisance: ordinary measurement error '{name}' is not known{suggest(name, ORDINARY)}")
-        row = FAULTS[name]
+        row = ARTEFACTS[name]
         unit = "" if row.unit == "1" else f" {row.unit}"
         least = _LEAST * row.sd
         if not least <= sd <= row.upper:

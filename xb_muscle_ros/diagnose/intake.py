@@ -81,6 +81,14 @@ def read_fibres(
     return studies
 
 
+def given_twice(bags: Sequence[str | Path]) -> list[str]:
+    """A line on bags that are named more than once: each is taken once."""
+    found = [path for each in bags for path in find_bags([each])]
+    places = [path.resolve() for path in found]
+    again = dict.fromkeys(str(path) for path, place in zip(found, places, strict=True) if places.count(place) > 1)
+    return [f"bags that were given more than once are taken once: {', '.join(again)}"] if again else []
+
+
 def _check_files(fibres: Sequence[Fibre]) -> None:
     """Each fibre once, and one base model for all."""
     names = [f.name for f in fibres]

@@ -64,7 +64,7 @@ _ALL = tuple(Name._made.values())
 MECHANISMS: tuple[Name, ...] = _ALL[: _ALL.index(Name.PCA_SHIFT)]
 """Names that are physics."""
 MEASUREMENT: tuple[Name, ...] = _ALL[len(MECHANISMS) :]
-"""Names that are measurement artefacts: the rows of `measurement.faults.FAULTS`."""
+"""Names that are measurement artefacts: the rows of `measurement.artefacts.ARTEFACTS`."""
 _FAMILIES: Mapping[str, tuple[Name, ...]] = {
     "parallel_viscoelasticity": (Name.VISCOUS_DRAG, Name.PASSIVE_VISCOELASTICITY),
     "weak_binding": (Name.WEAKLY_BOUND_HEADS, Name.FILAMENT_FRICTION),

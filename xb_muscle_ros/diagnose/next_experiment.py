@@ -74,8 +74,8 @@ def _ramp(fibre: str, pca: float, start_l0: float, amplitude_l0: float, speed: f
     name = f"{kind}_{100 * abs(amplitude_l0):g}pct_{speed:g}_from_{100 * start_l0:g}pct_pca{10 * pca:g}"
     where = "rest length" if start_l0 == 0.0 else f"{100 * start_l0:g} % L0 beyond rest length"
     words = (
-        f"{kind} by {100 * abs(amplitude_l0):g} % L0 at {speed:g} L0/s from {where} at pCa {pca:g}, "
-        f"then hold for {_HOLD_S:g} s"
+        f"a {kind} by {100 * abs(amplitude_l0):g} % L0 at {speed:g} L0/s from {where} at pCa {pca:g}, "
+        f"then a hold for {_HOLD_S:g} s"
     )
     trial = Trial(
         TrialFacts(fibre=fibre, trial=name, pca=pca, phases=phases, source="proposed by xb_muscle diagnose"),
@@ -91,7 +91,7 @@ def propose(one: Fibre, other: Fibre, separates: Sequence[str], pcas: Sequence[f
     """The protocol on which two models differ most; None where neither has a solution on any.
 
     Args:
-        one, other: fitted fibres; measurement errors have no part in it, the next recording has its own.
+        one, other: fitted fibres; measurement artefacts have no part in it, the next recording has its own.
         separates: names of the components in which they differ.
         pcas: at which solutions are at hand.
     """

@@ -8,9 +8,10 @@ import numpy as np
 
 from xb_muscle_ros.diagnose.effort import Effort
 from xb_muscle_ros.diagnose.noise.residuals import Recordings
+from xb_muscle_ros.diagnose.result import Diagnosis
 from xb_muscle_ros.diagnose.search.descent import Fit
 from xb_muscle_ros.diagnose.search.system import SATURATING, Names, System, label
-from xb_muscle_ros.diagnose.words import human
+from xb_muscle_ros.diagnose.words import human, percent
 from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.models.fibre_file import Fibre
@@ -18,7 +19,7 @@ from xb_muscle_ros.scores.noise.model import Source
 from xb_muscle_ros.scores.noise.trials import ENOUGH
 from xb_muscle_ros.trials.trial import Trial
 
-# A nuisance this many of its usual sizes large is at the edge of what is ordinary.
+# A nuisance parameter this many prior SDs large is at the edge of what is ordinary.
 _EDGE = 2.0
 # A value this near a bound, as a share of the way between bounds, ended there.
 _AT_BOUND = 1e-3
@@ -44,6 +45,16 @@ def of_effort(effort: Effort, usual: Effort, trials: Mapping[str, int]) -> list[
             f"at least 3 are needed{', so no mechanism is sure' if len(few) == len(trials) else ''}"
         )
     return lines
+
+
+def of_benchmark(d: Diagnosis) -> list[str]:
+    """A line on a benchmark that the base beats."""
+    if not d.benchmark_is_beaten:
+        return []
+    return [
+        f"the non-parametric discrepancy benchmark ({percent(d.benchmark_rmsd_f0 or 0.0)} % F0 held out) is worse than "
+        f"the base model ({percent(d.before.heldout_rmsd_f0 or 0.0)} % F0): it says nothing of what could be predicted"
+    ]
 
 
 def of_fibre(given: Fibre, trials: Sequence[Trial], recordings: Recordings, system: System, shown: Fit) -> list[str]:
@@ -118,8 +129,8 @@ def _inputs(given: Fibre, trials: Sequence[Trial]) -> Iterator[str]:
 def _noise(recordings: Recordings) -> Iterator[str]:
     rows = recordings.noise.trials
     for source, words in (
-        (Source.CURVE, "from what smooth curves leave of force"),
-        (Source.DIFFERENCES, "from what neighbouring samples do not tell of each other"),
+        (Source.CURVE, "from the residual of smooth curves through force"),
+        (Source.DIFFERENCES, "from what neighbouring samples do not predict of each other"),
         (Source.OTHERS, "from the other trials"),
     ):
         named = [row.trial for row in rows if row.source is source]
@@ -155,7 +166,7 @@ def _edges(coordinates: Sequence[Coordinate], system: System) -> Iterator[str]:
         if c.group is not None and abs(c.start) > _EDGE * system.error_sd(c.name)
     ]
     if far:
-        yield f"measurement errors beyond {_EDGE:g} of their usual sizes: {', '.join(far)}"
+        yield f"ordinary measurement artefacts beyond {_EDGE:g} of their usual sizes: {', '.join(far)}"
 
 
 def _named(names: Sequence[str]) -> str:

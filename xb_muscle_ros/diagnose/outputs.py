@@ -1,20 +1,24 @@
-"""What a diagnosis writes beside its record: augmented fibre files, and the next experiment's bag."""
+"""The files of a diagnosis: its record, its page, traces, augmented fibres and the next experiment's bag."""
 
 from __future__ import annotations
 
 import contextlib
+import json
 import re
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from xb_muscle_ros.diagnose.report import output
-from xb_muscle_ros.diagnose.report.traces import TrialTraces
+from xb_muscle_ros.diagnose.report.codec import from_json, to_json
+from xb_muscle_ros.diagnose.report.glossary import GLOSSARY
+from xb_muscle_ros.diagnose.report.prose import headline, summary
+from xb_muscle_ros.diagnose.report.traces import TrialTraces, write_traces
 from xb_muscle_ros.diagnose.result import Diagnosis
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import matching
+from xb_muscle_ros.files import matching, write_text
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.fibre_writing import write_fibre
 from xb_muscle_ros.trials.bag_files import remove_results
@@ -22,6 +26,7 @@ from xb_muscle_ros.trials.bag_writing import write_trial
 from xb_muscle_ros.trials.trial import Trial
 
 AUGMENTED, NEXT = "augmented", "next_experiment"
+JSON, TRACES, PAGE = "diagnosis.json", "traces.npz", "report.html"
 
 
 @dataclass(frozen=True)
@@ -84,9 +89,35 @@ def _write(out: Path, d: Diagnosis, made: Files, report: bool) -> None:
             fibre,
             [
                 f"Model of fibre {fibre.name} with what a diagnosis found missing; see diagnosis.json beside it.",
-                "The fit also moved ordinary measurement errors, which no model has; they are in diagnosis.json.",
+                "The fit also moved ordinary measurement artefacts, which no model has; they are in diagnosis.json.",
             ],
         )
     if made.protocol is not None:
         write_trial(out / NEXT, made.protocol)
-    output.write(out, d, made.traces, report)
+    # Templates and figures take long to load; whoever only reads a diagnosis needs neither.
+    if report:
+        from xb_muscle_ros.diagnose.report.html import as_html
+
+        write_text(out / PAGE, as_html(d, made.traces))
+    write_traces(out / TRACES, made.traces)
+    write_text(out / JSON, json.dumps(as_row(d), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def as_row(d: Diagnosis) -> dict[str, Any]:
+    """What `diagnosis.json` holds: the record, and for its readers what was made of it in words."""
+    terms = {key: term.text for key, term in GLOSSARY.items()}
+    return {"headline": headline(d), "summary": " ".join(summary(d)), **to_json(d), "glossary": terms}
+
+
+def read(folder: Path) -> Diagnosis:
+    """The diagnosis of a folder.
+
+    Raises:
+        UserError: its file is missing, damaged or of a format that is not read.
+    """
+    path = folder / JSON
+    try:
+        row = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise UserError(f"{path} cannot be read: {error}; give a folder that xb_muscle diagnose wrote") from error
+    return from_json(row, str(path))

@@ -15,14 +15,15 @@ from xb_muscle_ros.diagnose.effort import Effort
 from xb_muscle_ros.diagnose.inference.answer import answer_of, components, verdict_of
 from xb_muscle_ros.diagnose.inference.shares import explained
 from xb_muscle_ros.diagnose.names import MEASUREMENT
-from xb_muscle_ros.diagnose.next_experiment import Proposal, scaled
+from xb_muscle_ros.diagnose.next_experiment import scaled
 from xb_muscle_ros.diagnose.noise.closure import by_distribution
 from xb_muscle_ros.diagnose.noise.residuals import Around
 from xb_muscle_ros.diagnose.noise.significance import ALPHA, FLOOR_F0
 from xb_muscle_ros.diagnose.outputs import NEXT, Files, augmented_name
 from xb_muscle_ros.diagnose.planning import plan
-from xb_muscle_ros.diagnose.result import FORMAT, Diagnosis, Law, NextExperiment, Remaining, SetOfMechanisms, Verdict
-from xb_muscle_ros.diagnose.rows import benchmark, law_row, nuisances, of_fibres, of_trials, places, scores
+from xb_muscle_ros.diagnose.residual import AnswerResidual, ResidualLaw, ResidualMap
+from xb_muscle_ros.diagnose.result import FORMAT, Diagnosis, NextExperiment, SetOfMechanisms, Verdict
+from xb_muscle_ros.diagnose.rows import benchmark, law_row, nuisance_parameters, of_fibres, of_trials, places, scores
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.search.whole import beside, only
 from xb_muscle_ros.diagnose.searching import Searched
@@ -33,8 +34,8 @@ from xb_muscle_ros.models.fibre_file import Fibre
 
 Array = npt.NDArray[np.float64]
 
-# More noise than this hides what is looked for, F0; a base that leaves more than this share of the force's standard
-# deviation does not describe the recordings.
+# More noise than this hides what is looked for, F0; a base whose residual is more than this share of the force's
+# standard deviation does not describe the recordings.
 _NOISY_F0, _UNDESCRIBED = 0.02, 0.5
 # A residual follows a law that predicts this share of it where it is left out.
 _LAW = 0.2
@@ -45,14 +46,13 @@ _MOST_SETS = 40
 
 def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Files]:
     """What was found, and what goes into files; seconds are left to the caller."""
-    judged, explorer = study.judged, study.explorer
-    chosen = judged.chosen
+    judged, chosen = study.judged, study.judged.chosen
     count = len(study.fibres)
     before = [study.around((), i) for i in range(count)]
     after = [study.around(chosen, i) if chosen else before[i] for i in range(count)]
-    left = [study.recordings[i].significance(after[i]) if chosen else study.base[i] for i in range(count)]
+    of_answer = [study.recordings[i].significance(after[i]) if chosen else study.base[i] for i in range(count)]
     traces = traced(study, chosen, before, after)
-    found = tuple(directed(study, c, traces) for c in components(judged))
+    found = _by_component([directed(study, c, traces) for c in components(judged)])
     detected = any(s.detected(ALPHA) for s in study.base)
     described = _described(study, before, after)
     fine = all(
@@ -64,27 +64,16 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
     names = [f.name for f in study.fibres]
     augmented = _augmented(study, chosen) if answer else {}
     proposal = plan(study, found) if detected or answer else None
-    heldout = judged.heldout
-    gain = heldout.gain(chosen, ()) if chosen else None
-    known = {n: i for i, n in enumerate(names)}
-    base_law, last_law = (_law(study, arounds, detected) for arounds in (before, after))
-    remaining = Remaining(
-        rmsd_f0=_rmsd(np.concatenate([a.residual_f0 for a in after])),
-        noise_f0=float(np.median(judged.noise_f0)),
-        where=places(names, left),
-        law=last_law,
-    )
-    warned = [w for s in study.studies for t in s.trials for w in t.warnings]
-    warned += study.lines
+    base_law, answer_law = (_law(study, arounds, detected) for arounds in (before, after))
+    trials = of_trials(study, chosen, traces)
+    warned = [*(w for s in study.studies for t in s.trials for w in t.warnings), *study.lines]
+    notes_of_all = _notes(study, chosen, effort)
     if augmented:
         for i in range(count):
-            base = study.fibre_with((), i)
-            with_all = study.fibre_with(chosen, i)
-            warned += outside.warnings(with_all, base, study.recorded[i].trials)
-    trials = of_trials(study, chosen, traces)
-    if augmented:
+            fibres = study.fibre_with(chosen, i), study.fibre_with((), i)
+            warned += outside.warnings(*fibres, study.recorded[i].trials)
+            notes_of_all.append(_without_errors(study, chosen, i))
         warned += outside.worse_left_out(trials)
-    errorless = [_without_errors(study, chosen, i) for i in range(count)] if augmented else []
     d = Diagnosis(
         format_version=FORMAT,
         fibres=tuple(names),
@@ -96,28 +85,38 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
         verdict=verdict,
         answer=answer,
         components=found,
-        explained_share=explained(explorer, chosen, judged.noise_f0) if chosen else 0.0,
+        explained_fraction=explained(study.explorer, chosen, judged.noise_f0) if chosen else 0.0,
         mismatch=places(names, study.base),
         p_value=min(1.0, count * min(s.overall_p for s in study.base)),
         described=described,
-        remaining=remaining,
+        residual=AnswerResidual(
+            rmsd_f0=_rmsd(np.concatenate([a.residual_f0 for a in after])),
+            noise_f0=float(np.median(judged.noise_f0)),
+            places=places(names, of_answer),
+            law=answer_law,
+        ),
         base_law=base_law,
         before=scores(study, ()),
         after=scores(study, chosen),
-        heldout_gain=gain,
+        heldout_gain=judged.heldout.gain(chosen, ()) if chosen else None,
         benchmark_rmsd_f0=benchmark(study, before),
         sets=_sets(study),
         by_fibre=of_fibres(study, chosen, found),
         trials=trials,
-        nuisances=nuisances(study, chosen),
-        map_before={n: study.base[known[n]].map(ALPHA) for n in names},
-        map_after={n: left[known[n]].map(ALPHA) for n in names},
-        next_experiment=_next(proposal),
+        nuisance_parameters=nuisance_parameters(study, chosen),
+        map_before={n: ResidualMap.of(s.map(ALPHA)) for n, s in zip(names, study.base, strict=True)},
+        map_after={n: ResidualMap.of(s.map(ALPHA)) for n, s in zip(names, of_answer, strict=True)},
+        next_experiment=None
+        if proposal is None
+        else NextExperiment(NEXT, proposal.protocol.words, proposal.separates, proposal.difference_f0),
         augmented={f.name: name for name, f in augmented.items()},
         warnings=tuple(dict.fromkeys(warned)),
         missing=tuple(_missing(study, verdict, found, after)),
-        notes=(*_notes(study, chosen, effort), *errorless),
+        notes=tuple(notes_of_all),
+        # Of each fibre's two family-wise tests the lesser counts, twice.
+        p_value_floor=2.0 / (effort.draws + 1.0),
     )
+    d = replace(d, notes=(*d.notes, *notes.of_benchmark(d)))
     protocol = None
     if proposal is not None:
         fibre = study.fibres[0]
@@ -125,8 +124,18 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
     return d, Files(augmented, tuple(t.plain for t in traces), protocol)
 
 
+def _by_component(found: Sequence[Component]) -> tuple[Component, ...]:
+    """Rivals by the components that they are or are members of; a component is no rival of itself."""
+    of = {name: c.name for c in found for name in c.members}
+    rivals = [dict.fromkeys(of.get(name, name) for name in c.not_separable_from) for c in found]
+    return tuple(
+        replace(c, not_separable_from=tuple(name for name in names if name != c.name))
+        for c, names in zip(found, rivals, strict=True)
+    )
+
+
 def _without_errors(study: Searched, chosen: Names, i: int) -> str:
-    """A line on what an augmented file does by itself: measurement errors are in the fit, not in the fibre."""
+    """A line on what an augmented file does by itself: measurement artefacts are in the fit, not in the fibre."""
     recorded, values = study.recorded[i], study.explorer.fits[chosen][i].values
     problem = recorded.problem(chosen, values)
     z = np.array(
@@ -136,12 +145,12 @@ def _without_errors(study: Searched, chosen: Names, i: int) -> str:
     try:
         forces = problem.predicted(z)
     except UserError:
-        return f"{name}: the augmented file has no solution without the measurement errors of the fit"
-    left = [f - t.measured_f0 for f, t in zip(forces, recorded.trials, strict=True)]
+        return f"{name}: the augmented file has no solution without the measurement artefacts of the fit"
+    residual = [f - t.measured_f0 for f, t in zip(forces, recorded.trials, strict=True)]
     with_errors = _rmsd(study.around(chosen, i).residual_f0)
     return (
-        f"{name}: a replay of the augmented file leaves {percent(_rmsd(np.concatenate(left)))} % F0, because files "
-        "have no measurement errors (pCa shifts, gain of length, offsets); with those of the fit it is "
+        f"{name}: a replay of the augmented file leaves {percent(_rmsd(np.concatenate(residual)))} % F0, because files "
+        "have no measurement artefacts (pCa shifts, gain of length, offsets); with those of the fit it is "
         f"{percent(with_errors)} % F0"
     )
 
@@ -154,13 +163,13 @@ def _described(study: Searched, before: Sequence[Around], after: Sequence[Around
     """Whether there is anything to build on: the model describes the recordings, and noise does not hide all."""
     for i, recorded in enumerate(study.recorded):
         spread = float(np.std(recorded.measured))
-        left = min(_rmsd(before[i].residual_f0), _rmsd(after[i].residual_f0))
-        if study.judged.noise_f0[i] > _NOISY_F0 or left > _UNDESCRIBED * spread:
+        residual = min(_rmsd(before[i].residual_f0), _rmsd(after[i].residual_f0))
+        if study.judged.noise_f0[i] > _NOISY_F0 or residual > _UNDESCRIBED * spread:
             return False
     return True
 
 
-def _law(study: Searched, arounds: Sequence[Around], detected: bool) -> Law | None:
+def _law(study: Searched, arounds: Sequence[Around], detected: bool) -> ResidualLaw | None:
     """The law of the fibre whose residual follows one best; None where none does."""
     if not detected:
         return None
@@ -169,12 +178,11 @@ def _law(study: Searched, arounds: Sequence[Around], detected: bool) -> Law | No
         for i, around in enumerate(arounds)
         if (law := study.recordings[i].law(around)) is not None and law.explained >= _LAW
     ]
-    return max(found, key=lambda row: row.explained, default=None)
+    return max(found, key=lambda row: row.explained_fraction, default=None)
 
 
 def _sets(study: Searched) -> tuple[SetOfMechanisms, ...]:
     averages = study.judged.averages
-    order = np.argsort(-averages.log_evidence)[:_MOST_SETS]
     chances = averages.probability
     return tuple(
         SetOfMechanisms(
@@ -184,7 +192,7 @@ def _sets(study: Searched) -> tuple[SetOfMechanisms, ...]:
             rmsd_f0=float(np.sqrt(averages.mean_square_f0[k])),
             fitted=bool(averages.fitted[k]),
         )
-        for k in order
+        for k in np.argsort(-averages.log_evidence)[:_MOST_SETS]
     )
 
 
@@ -205,12 +213,6 @@ def _augmented(study: Searched, chosen: Names) -> dict[str, Fibre]:
     return made
 
 
-def _next(proposal: Proposal | None) -> NextExperiment | None:
-    if proposal is None:
-        return None
-    return NextExperiment(NEXT, proposal.protocol.words, proposal.separates, proposal.difference_f0)
-
-
 def _missing(study: Searched, verdict: Verdict, found: Sequence[Component], after: Sequence[Around]) -> list[str]:
     """What a firmer answer would need, a line each."""
     lines = []
@@ -222,8 +224,8 @@ def _missing(study: Searched, verdict: Verdict, found: Sequence[Component], afte
             lines.append(f"force with less noise: {100 * noise:.1f} % F0 in fibre {name} hides what is looked for")
         if _rmsd(after[i].residual_f0) > _UNDESCRIBED * float(np.std(recorded.measured)):
             lines.append(
-                f"recordings that the model describes at all: after the fit half of the force's variation of fibre "
-                f"{name} is left; check that channels, units, calcium and fibre belong together"
+                "recordings that the model describes at all: after the fit the residual of fibre "
+                f"{name} is half of its force's variation; check that channels, units, calcium and fibre fit"
             )
     if all(t.facts.pca is None or t.facts.pca < 8.0 for s in study.studies for t in s.trials):
         lines.append("a trial without calcium (pCa 9), which tells passive from active effects")

@@ -9,9 +9,10 @@ import enum
 from dataclasses import dataclass, field
 
 from xb_muscle_ros.diagnose.component import NAMED, Component, HeldOutGain
+from xb_muscle_ros.diagnose.residual import AnswerResidual, Place, ResidualLaw, ResidualMap
 
-FORMAT = 2
-"""Version of `diagnosis.json`."""
+FORMAT = 3
+"""Version of `diagnosis.json`; `report.older_formats` has the keys of former ones."""
 
 
 class Verdict(str, enum.Enum):
@@ -29,70 +30,6 @@ class Verdict(str, enum.Enum):
     """Mechanisms have evidence, but none is sure or none predicts better beyond its standard error."""
     UNEXPLAINED = "unexplained"
     """There is a mismatch, and nothing has evidence."""
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a residual stands out.
-
-    Attributes:
-        fibre, trial, phase: where; times of the trial, s.
-        pca: of the solution; None where it changes.
-        size_f0: root mean square of measured less simulated force, F0.
-        mean_f0: its mean, F0: above 0 where the fibre pulls harder than the model.
-        p_value: family-wise.
-    """
-
-    fibre: str
-    trial: str
-    phase: str
-    start_s: float
-    end_s: float
-    size_f0: float
-    mean_f0: float
-    p_value: float
-    pca: float | None = None
-
-
-@dataclass(frozen=True)
-class Law:
-    """What a residual follows: memories of stretch, described and not explained.
-
-    Attributes:
-        fibre: whose.
-        time_constant_s: the dominant one.
-        scales_with: ``constant``, ``activation``, ``calcium`` or ``force``.
-        gain_f0_per_l0: force per length of a sudden change.
-        explained: share of the residual's mean square that it predicts in trials left out.
-        tau_s, weight_f0: of all memories.
-        others: the share for what else it could scale with.
-    """
-
-    fibre: str
-    time_constant_s: float
-    scales_with: str
-    gain_f0_per_l0: float
-    explained: float
-    tau_s: tuple[float, ...] = ()
-    weight_f0: tuple[float, ...] = ()
-    others: dict[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Remaining:
-    """What the answer leaves.
-
-    Attributes:
-        rmsd_f0: of all trials, F0.
-        noise_f0: of the recordings, F0.
-        where: the largest first; empty where nothing stands out.
-        law: None where none holds.
-    """
-
-    rmsd_f0: float
-    noise_f0: float
-    where: tuple[Place, ...]
-    law: Law | None
 
 
 @dataclass(frozen=True)
@@ -130,8 +67,8 @@ class SetOfMechanisms:
 
 
 @dataclass(frozen=True)
-class Nuisance:
-    """An ordinary measurement error as estimated.
+class NuisanceParameter:
+    """An ordinary measurement artefact as estimated: a nuisance parameter of every model.
 
     Attributes:
         fibre: whose.
@@ -160,7 +97,7 @@ class OfTrial:
     Attributes:
         fibre, trial, pca: which.
         phases: name, start and end in s.
-        noise_sd_f0, noise_from, noise_samples: of its force; `noise_from` as in `scores.noise.model.Source`.
+        noise_sd_f0, noise_source, noise_samples: of its force; `noise_source` as in `scores.noise.model.Source`.
         before_rmsd_f0, after_rmsd_f0: base and answer, fitted to all trials.
         heldout_before_f0, heldout_after_f0: predicted by fits that did not see its condition; None where none was
             left out.
@@ -171,7 +108,7 @@ class OfTrial:
     pca: float | None
     phases: tuple[tuple[str, float, float], ...]
     noise_sd_f0: float
-    noise_from: str
+    noise_source: str
     noise_samples: int
     before_rmsd_f0: float
     after_rmsd_f0: float
@@ -278,23 +215,24 @@ class Diagnosis:
         verdict: see `Verdict`.
         answer: mechanisms with an inclusion probability of `NAMED` or more, best first.
         components: all candidates, the most probable first.
-        explained_share: of the mismatch by the answer.
+        explained_fraction: of the mismatch by the answer.
         mismatch: where the base differs, the largest first.
         p_value: chance that noise leaves as much as the base did.
         described: False where the base does not describe the recordings at all, or noise hides everything.
-        remaining: what the answer leaves.
-        base_law: what the base's residual follows; None where none holds.
+        residual: what the answer leaves.
+        base_law: describes the base's residual; None where none holds.
         before, after: scores of base and answer.
         heldout_gain: of the answer as a whole; None where nothing was left out.
         benchmark_rmsd_f0: held-out RMSD of a non-parametric discrepancy benchmark; None where there is none.
         sets: sets averaged over, the most probable first.
-        by_fibre, trials, nuisances, features, feature_scores: rows.
-        map_before, map_after: trials x phases residual maps for the figures (see `Significance.map`), by fibre.
+        by_fibre, trials, nuisance_parameters, features, feature_scores: rows.
+        map_before, map_after: residual of base and answer by trial and phase, by fibre.
         next_experiment: None where nothing is to be separated.
         augmented: files of the augmented fibres, by fibre; empty where the answer has no mechanism.
         warnings: a line each, such as absurd forces outside the study.
         missing: what a firmer answer needs, a line each.
         notes: what was assumed, skipped or left out, a line each.
+        p_value_floor: the bootstrap gives no lower p-value of one fibre; 0 where that is unknown.
     """
 
     format_version: int
@@ -307,12 +245,12 @@ class Diagnosis:
     verdict: Verdict
     answer: tuple[str, ...]
     components: tuple[Component, ...]
-    explained_share: float
+    explained_fraction: float
     mismatch: tuple[Place, ...]
     p_value: float
     described: bool
-    remaining: Remaining
-    base_law: Law | None
+    residual: AnswerResidual
+    base_law: ResidualLaw | None
     before: Scores
     after: Scores
     heldout_gain: HeldOutGain | None
@@ -320,20 +258,23 @@ class Diagnosis:
     sets: tuple[SetOfMechanisms, ...]
     by_fibre: tuple[OfStudyFibre, ...]
     trials: tuple[OfTrial, ...]
-    nuisances: tuple[Nuisance, ...]
+    nuisance_parameters: tuple[NuisanceParameter, ...]
     features: tuple[Feature, ...] = ()
     feature_scores: tuple[FeatureScore, ...] = ()
-    map_before: dict[str, dict[str, list[object]]] = field(default_factory=dict)
-    map_after: dict[str, dict[str, list[object]]] = field(default_factory=dict)
+    map_before: dict[str, ResidualMap] = field(default_factory=dict)
+    map_after: dict[str, ResidualMap] = field(default_factory=dict)
     next_experiment: NextExperiment | None = None
     augmented: dict[str, str] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     missing: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    p_value_floor: float = 0.0
 
-    def component(self, name: str) -> Component | None:
-        """The component of a name, or that has it as a member."""
-        return next((c for c in self.components if c.name == name or name in c.members), None)
+    @property
+    def benchmark_is_beaten(self) -> bool:
+        """Whether the base predicts better than the benchmark, which then says nothing of what could be predicted."""
+        base, benchmark = self.before.heldout_rmsd_f0, self.benchmark_rmsd_f0
+        return base is not None and benchmark is not None and benchmark > base
 
     @property
     def named(self) -> tuple[Component, ...]:

@@ -1,4 +1,4 @@
-"""Rows of the record: trials, fibres, nuisances, places and scores."""
+"""Rows of the record: trials, fibres, nuisance parameters, places and scores."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.component import NAMED, Component, Kind
 from xb_muscle_ros.diagnose.inference.left_out import left_out
-from xb_muscle_ros.diagnose.noise.kernel import Law as FoundLaw
+from xb_muscle_ros.diagnose.noise.kernel import Law
 from xb_muscle_ros.diagnose.noise.residuals import Around
 from xb_muscle_ros.diagnose.noise.significance import ALPHA, Significance
-from xb_muscle_ros.diagnose.result import Law, Nuisance, OfStudyFibre, OfTrial, Place, Scores
+from xb_muscle_ros.diagnose.residual import Place, ResidualLaw
+from xb_muscle_ros.diagnose.result import NuisanceParameter, OfStudyFibre, OfTrial, Scores
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.searching import Searched
 from xb_muscle_ros.diagnose.tracing import Traced
-from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 from xb_muscle_ros.models.parameters import PARAMETERS
 
 Array = npt.NDArray[np.float64]
@@ -58,17 +59,17 @@ def places(names: Sequence[str], found: Sequence[Significance]) -> tuple[Place, 
     return tuple(rows[:_MOST_PLACES] if len(names) > 1 else rows)
 
 
-def law_row(fibre: str, law: FoundLaw) -> Law:
+def law_row(fibre: str, law: Law) -> ResidualLaw:
     """A law as a row."""
-    return Law(
+    return ResidualLaw(
         fibre=fibre,
         time_constant_s=law.time_constant_s,
         scales_with=law.scales_with,
         gain_f0_per_l0=law.stiffness_f0_per_l0,
-        explained=law.explained,
+        explained_fraction=law.explained,
         tau_s=tuple(law.tau_s.tolist()),
         weight_f0=tuple(law.weight_f0.tolist()),
-        others=dict(law.others),
+        other_scalings=dict(law.others),
     )
 
 
@@ -103,7 +104,7 @@ def of_trials(study: Searched, chosen: Names, traces: Sequence[Traced]) -> tuple
                 pca=t.residual.pca,
                 phases=tuple((p.name, p.start_s, p.end_s) for p in t.residual.phases),
                 noise_sd_f0=noise.sd_f0,
-                noise_from=noise.source.value,
+                noise_source=noise.source.value,
                 noise_samples=noise.samples,
                 before_rmsd_f0=_rmsd(t.before_f0 - t.measured_f0),
                 after_rmsd_f0=_rmsd(t.after_f0 - t.measured_f0),
@@ -114,16 +115,16 @@ def of_trials(study: Searched, chosen: Names, traces: Sequence[Traced]) -> tuple
     return tuple(rows)
 
 
-def nuisances(study: Searched, chosen: Names) -> tuple[Nuisance, ...]:
-    """Measurement errors as estimated beside the answer and the base."""
+def nuisance_parameters(study: Searched, chosen: Names) -> tuple[NuisanceParameter, ...]:
+    """Ordinary measurement artefacts as estimated beside the answer and the base."""
     rows = []
     for i, system in enumerate(study.explorer.systems):
         fit, base = study.explorer.fits[chosen][i], study.explorer.fits[()][i]
         for c in system.problem(chosen, fit.values).coordinates:
             if c.group is not None:
                 rows.append(
-                    Nuisance(
-                        fibre=study.fibres[i].name, name=c.name, group=c.group, unit=FAULTS[c.name].unit,
+                    NuisanceParameter(
+                        fibre=study.fibres[i].name, name=c.name, group=c.group, unit=ARTEFACTS[c.name].unit,
                         value=fit.values[c.label], sd=fit.sds[c.label], prior_sd=system.error_sd(c.name),
                         before=base.values.get(c.label),
                     )

@@ -12,7 +12,7 @@ from xb_muscle_ros.diagnose.effort import QUICK, Effort
 from xb_muscle_ros.diagnose.error_sds import told_of
 from xb_muscle_ros.diagnose.feature_tables import FeatureTable, read_features
 from xb_muscle_ros.diagnose.featuring import with_features
-from xb_muscle_ros.diagnose.intake import FibreStudy, read_fibres
+from xb_muscle_ros.diagnose.intake import FibreStudy, given_twice, read_fibres
 from xb_muscle_ros.diagnose.outputs import Files, write
 from xb_muscle_ros.diagnose.recording import recorded
 from xb_muscle_ros.diagnose.result import Diagnosis
@@ -65,6 +65,7 @@ def diagnose_bags(
     options = options or Options(processes=0, quiet=True)
     options = replace(options, journal=options.journal or out / "journal.jsonl")
     found, made = diagnose(studies, QUICK if quick else Effort(), seed, options, data, table, error_sds)
+    found = replace(found, notes=(*found.notes, *given_twice(bags)))
     write(out, found, made, report)
     return found
 

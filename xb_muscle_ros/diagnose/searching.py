@@ -104,7 +104,7 @@ def begun(
         seed: of the bootstrap.
         options: where work is done.
         features: to be met beside the traces, by fibre.
-        error_sds: of ordinary measurement errors, in place of those of `measurement.faults.FAULTS`.
+        error_sds: of ordinary measurement errors, in place of those of `measurement.artefacts.ARTEFACTS`.
 
     Raises:
         UserError: no solution at the start.

@@ -5,22 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
-from xb_muscle_ros.diagnose.answers import FAMILY
-from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.models.catalogue import CATALOGUE
 
-# Name and meaning of measurement artefacts; mechanisms bring theirs.
-_ARTEFACTS: Mapping[Name, tuple[str, str]] = {
-    Name.PCA_SHIFT: ("pCa shift", "a solution had more or less free calcium than its label says"),
-    Name.RUN_DOWN: ("run-down", "the fibre lost force from trial to trial"),
-    Name.FORCE_OFFSET: ("force offset", "the transducer did not read zero at zero force"),
-    Name.FORCE_DRIFT: ("force drift", "the reading of the transducer crept during a trial"),
-    Name.LENGTH_GAIN: ("length gain", "the length changes were larger or smaller than recorded"),
-    Name.TIME_SHIFT: ("time shift", "force and length were recorded out of step"),
-    Name.TRANSDUCER_LAG: ("transducer lag", "the transducer follows force with a delay"),
+# Names that are not their identifier with spaces; mechanisms bring theirs.
+_NAMES: Mapping[str, str] = {
+    "pca_shift": "pCa shift",
+    "run_down": "run-down",
+    "base": "the base model",
+}
+_MEANINGS: Mapping[str, str] = {
+    "pca_shift": "a solution had more or less free calcium than its label says",
+    "run_down": "the fibre lost force from trial to trial",
+    "force_offset": "the transducer did not read zero at zero force",
+    "force_drift": "the reading of the transducer crept during a trial",
+    "length_gain": "the length changes were larger or smaller than recorded",
+    "time_shift": "force and length were recorded out of step",
+    "transducer_lag": "the transducer follows force with a delay",
 }
 _FAMILIES: Mapping[str, str] = {
-    "parallel_viscoelasticity": "parallel viscoelasticity",
     "weak_binding": "weak binding and friction",
     "calcium_dependent_elasticity": "calcium-dependent elasticity",
     "length_dependence": "length dependence of activation and attachment",
@@ -29,7 +31,6 @@ _FAMILIES: Mapping[str, str] = {
     "heterogeneity": "heterogeneity of half-sarcomeres",
     "compliance": "series compliance",
     "rates": "temperature and chemistry",
-    "calcium_of_solutions": "calcium of the solutions",
     "force_scale": "scale of force",
     "force_zero": "zero of force",
     "length_scale": "scale of length",
@@ -43,43 +44,22 @@ SCALES: Mapping[str, str] = MappingProxyType(
         "force": "scales with force",
     }
 )
-"""What a remainder scales with, after its subject."""
-# The scale for likelihood of Mastrandrea et al. 2010 (guidance note of the IPCC on uncertainties): lower limits.
-_LIKELY = (
-    (0.99, "virtually certain"),
-    (0.90, "very likely"),
-    (0.66, "likely"),
-    (0.33, "about as likely as not"),
-    (0.10, "unlikely"),
-    (0.0, "very unlikely"),
-)
-
-
-def parts(name: str) -> list[str]:
-    """Names in a pair written ``a+b``; a single name alone."""
-    return [part for part in (piece.strip() for piece in name.split("+")) if part]
+"""What a residual scales with, after its subject."""
 
 
 def human(name: str) -> str:
-    """A mechanism, fault or pair as a sentence calls it."""
-    if name == "base":
-        return "the base model"
-    return " with ".join(_one(part)[0] for part in parts(name)) or name
+    """A mechanism or artefact as a sentence calls it."""
+    return CATALOGUE[name].title if name in CATALOGUE else _NAMES.get(name, name.replace("_", " "))
 
 
 def meaning(name: str) -> str:
     """What it is, in one line; empty where nothing is known."""
-    return "; ".join(m for m in (_one(part)[1] for part in parts(name)) if m)
+    return CATALOGUE[name].meaning if name in CATALOGUE else _MEANINGS.get(name, "")
 
 
 def family_words(family: str) -> str:
     """A family as a sentence calls it."""
     return _FAMILIES.get(family, family.replace("_", " "))
-
-
-def family_of(name: str) -> str | None:
-    """Family of a known name, else None."""
-    return FAMILY.get(Name(name))
 
 
 def phase_words(phase: str) -> str:
@@ -92,11 +72,6 @@ def joined(items: Sequence[str], last: str = "and") -> str:
     if len(items) < 2:
         return "".join(items)
     return f"{', '.join(items[:-1])} {last} {items[-1]}"
-
-
-def likely(share: float) -> str:
-    """A probability in words."""
-    return next(words for least, words in _LIKELY if share >= least or least == 0.0)
 
 
 def digits(value: float, significant: int = 2) -> str:
@@ -116,9 +91,14 @@ def percent(value_f0: float) -> str:
     return digits(100.0 * value_f0)
 
 
-def quantity(value: float, unit: str | None) -> str:
+def quantity(value: float, unit: str | None, significant: int = 3) -> str:
     """A value with its unit; ``1`` is none."""
-    return digits(value, 3) + ("" if unit in (None, "", "1") else f" {unit}")
+    return digits(value, significant) + after_number(unit)
+
+
+def after_number(unit: str | None) -> str:
+    """A unit as it follows a number; ``1`` is none."""
+    return "" if unit in (None, "", "1") else f" {unit}"
 
 
 def chance(p_value: float) -> str:
@@ -129,10 +109,3 @@ def chance(p_value: float) -> str:
         if p_value * repeats >= 1.0:
             return f"in about {round(p_value * repeats)} of {repeats} repeats"
     return "in fewer than 1 of 10000 repeats"
-
-
-def _one(name: str) -> tuple[str, str]:
-    """Name and meaning of one mechanism or artefact."""
-    if name in CATALOGUE:
-        return CATALOGUE[name].title, CATALOGUE[name].meaning
-    return _ARTEFACTS.get(Name(name), (name.replace("_", " "), ""))

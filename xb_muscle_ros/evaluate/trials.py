@@ -12,7 +12,7 @@ import numpy.typing as npt
 from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable
 from xb_muscle_ros.scores.conditions import AMPLITUDES_L0, CONDITIONS, RECOVERIES_S
 from xb_muscle_ros.simulation.offline import one_for_all
-from xb_muscle_ros.trials.alike import alike
+from xb_muscle_ros.trials.study import alike
 from xb_muscle_ros.trials.trial import Array
 
 MEASURED = "measured"

@@ -19,7 +19,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.fit.problem import Problem, moves_simulation, touches
-from xb_muscle_ros.measurement.faults import FAULTS, Scope
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS, Scope
 from xb_muscle_ros.models.muscle import Muscle
 
 Array = npt.NDArray[np.float64]
@@ -53,10 +53,12 @@ def own_faults(problem: Problem, trial: FitTrial, known: bool = True) -> tuple[C
         trial: any.
         known: leave out those of which the problem has this trial's value, as a solution's that the fit met.
     """
-    kinds = {c.name: c for c in problem.coordinates if c.group is not None and FAULTS[c.name].scope is not Scope.STUDY}
+    kinds = {
+        c.name: c for c in problem.coordinates if c.group is not None and ARTEFACTS[c.name].scope is not Scope.STUDY
+    }
     met = {c.name for c in problem.coordinates if known and c.group is not None and touches(c, trial)}
     groups = {Scope.TRIAL: trial.name, Scope.SOLUTION: trial.solution}
-    return tuple(replace(c, group=groups[FAULTS[name].scope]) for name, c in kinds.items() if name not in met)
+    return tuple(replace(c, group=groups[ARTEFACTS[name].scope]) for name, c in kinds.items() if name not in met)
 
 
 def calibrated_force(problem: Problem, z: Array, trial: FitTrial, known: bool = True) -> Calibrated:
@@ -114,7 +116,7 @@ def _begin(trial: FitTrial, still: npt.NDArray[np.bool_]) -> FitTrial:
     """The trial up to the end of its steady force, of which that alone counts."""
     times = trial.force_time_s[still]
     # Force that is recorded late or early is that of other samples.
-    last = int(np.searchsorted(trial.time_s, times[-1] + FAULTS["time_shift"].upper)) + 1
+    last = int(np.searchsorted(trial.time_s, times[-1] + ARTEFACTS["time_shift"].upper)) + 1
     return replace(
         trial,
         time_s=trial.time_s[:last],

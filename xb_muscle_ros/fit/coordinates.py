@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.measurement.faults import FAULTS, Scope
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS, Scope
 from xb_muscle_ros.mechanisms import Entry
 from xb_muscle_ros.models.catalogue import mechanisms_of
 from xb_muscle_ros.models.fibre_file import Fibre
@@ -250,7 +250,7 @@ def fault_coordinates(
     """Coordinates of faults, one for each trial, solution or study that has its own value.
 
     Args:
-        names: of `FAULTS`.
+        names: of `ARTEFACTS`.
         trials, solutions: names of the trials, and of the solution of each.
         sds: standard deviations that replace those of the table.
 
@@ -259,9 +259,9 @@ def fault_coordinates(
     """
     found = []
     for name in dict.fromkeys(names):
-        if name not in FAULTS:
-            raise UserError(f"measurement fault '{name}' is not known{suggest(name, FAULTS)}")
-        row = FAULTS[name]
+        if name not in ARTEFACTS:
+            raise UserError(f"measurement fault '{name}' is not known{suggest(name, ARTEFACTS)}")
+        row = ARTEFACTS[name]
         sd = sds.get(name, row.sd)
         if not sd > 0.0:
             unit = "" if row.unit == "1" else f" {row.unit}"

@@ -13,7 +13,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.scores.rmsd import windows
 from xb_muscle_ros.scores.steady import steady_part
 from xb_muscle_ros.simulation.offline import calcium_per_step
-from xb_muscle_ros.trials.ros_types import to_ns
+from xb_muscle_ros.trials.stamps import to_ns
 from xb_muscle_ros.trials.trial import Trial
 
 Array = npt.NDArray[np.float64]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.fit.data import FitTrial
-from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY, Scope
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS, ORDINARY, Scope
 
 # An estimate this many standard deviations of its prior from 0 is told.
 BEYOND = 2.0
@@ -42,7 +42,7 @@ def fitted_line(parameters: Sequence[Mapping[str, Any]]) -> str:
             kinds.setdefault(row["name"], []).append(row)
     told = []
     for name, rows in kinds.items():
-        scope, sd = FAULTS[name].scope, rows[0]["prior_sd"]
+        scope, sd = ARTEFACTS[name].scope, rows[0]["prior_sd"]
         many = "" if scope is Scope.STUDY else f"{len(rows)} {scope.value}{'s' * (len(rows) > 1)}, "
         told.append(f"{name} ({many}{'no prior' if sd is None else f'SD {sd:g}{unit_of(name)}'})")
     return f"errors of the measurement fitted beside: {', '.join(told)}" if told else ""
@@ -69,5 +69,5 @@ def beyond_line(parameters: Sequence[Mapping[str, Any]], trials: Sequence[Mappin
 
 def unit_of(name: str) -> str:
     """Unit of a fault behind a number, with its space; empty for a pure number."""
-    unit = FAULTS[name].unit
+    unit = ARTEFACTS[name].unit
     return "" if unit == "1" else f" {unit}"

@@ -16,7 +16,7 @@ from xb_muscle_ros.fit.coordinates import Coordinate, from_json, to_json
 from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.fit.features import Feature
-from xb_muscle_ros.measurement.faults import FAULTS, Scope
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS, Scope
 from xb_muscle_ros.measurement.recording import given_calcium, given_length, recorded_force
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
@@ -165,9 +165,9 @@ def touches(c: Coordinate, trial: FitTrial) -> bool:
 
 
 def _bears_on(fault: Coordinate, trial: str, solution: str) -> bool:
-    return fault.group == {Scope.TRIAL: trial, Scope.SOLUTION: solution, Scope.STUDY: ""}[FAULTS[fault.name].scope]
+    return fault.group == {Scope.TRIAL: trial, Scope.SOLUTION: solution, Scope.STUDY: ""}[ARTEFACTS[fault.name].scope]
 
 
 def moves_simulation(c: Coordinate) -> bool:
     """Whether a coordinate bears on what the fibre does, or on its recording alone."""
-    return c.group is None or FAULTS[c.name].on_input
+    return c.group is None or ARTEFACTS[c.name].on_input

@@ -25,7 +25,7 @@ from xb_muscle_ros.fit.run import Fitted
 from xb_muscle_ros.fit.start import held, unfitted_nuisances
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.fit.uncertainty import correlation
-from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.fibre_writing import write_fibre
 from xb_muscle_ros.models.muscle import Muscle
@@ -119,7 +119,7 @@ def parameter_rows(fitted: Fitted) -> list[dict[str, Any]]:
         row: dict[str, Any] = {
             "name": c.name,
             "group": c.group,
-            "unit": PARAMETERS[c.name].unit if c.group is None else FAULTS[c.name].unit,
+            "unit": PARAMETERS[c.name].unit if c.group is None else ARTEFACTS[c.name].unit,
             "start": c.start,
             "value": c.outward(z),
             "log_scale": c.log,

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from xb_muscle_ros.fit.coordinates import free_names
 from xb_muscle_ros.fit.problem import Problem
-from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 from xb_muscle_ros.models.catalogue import mechanisms_of, starts_for, without_effect
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.trials.trial import TrialFacts
@@ -86,7 +86,7 @@ def start_lines(fibre: Fibre) -> list[str]:
 def unfitted_nuisances(problem: Problem) -> list[str]:
     """Names of the measurement artefacts that are taken as absent."""
     fitted = {c.name for c in problem.coordinates if c.group is not None}
-    return [name for name in FAULTS if name not in fitted]
+    return [name for name in ARTEFACTS if name not in fitted]
 
 
 def null_lines(problem: Problem) -> list[str]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from xb_muscle_ros.fit.ends import PRIOR, closes
 from xb_muscle_ros.fit.ordinary import fitted_line, unit_of
-from xb_muscle_ros.measurement.faults import FAULTS, Scope
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS, Scope
 
 # Beyond so many trials their faults have one line of the table.
 _MANY = 4
@@ -20,7 +20,7 @@ def table(found: Mapping[str, Any]) -> str:
     kinds = Counter(row["name"] for row in found["parameters"])
     told: set[str] = set()
     for row in found["parameters"]:
-        if row["group"] is not None and kinds[row["name"]] > _MANY and FAULTS[row["name"]].scope is Scope.TRIAL:
+        if row["group"] is not None and kinds[row["name"]] > _MANY and ARTEFACTS[row["name"]].scope is Scope.TRIAL:
             if row["name"] not in told:
                 values = [r["value"] for r in found["parameters"] if r["name"] == row["name"]]
                 spread = f"{min(values):.4g} to {max(values):.4g}"

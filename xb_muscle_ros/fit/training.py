@@ -12,7 +12,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit import features
 from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.fit.problem import Problem, moves_simulation, touches
-from xb_muscle_ros.measurement.faults import FAULTS
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 from xb_muscle_ros.models.muscle import Muscle
 
 Array = npt.NDArray[np.float64]
@@ -118,7 +118,7 @@ class Training:
 def step_of(c: Coordinate, step: float) -> float:
     """Step of a slope in a coordinate, from that of a parameter on a logarithmic scale."""
     if c.group is not None:
-        return step * FAULTS[c.name].sd / 0.05
+        return step * ARTEFACTS[c.name].sd / 0.05
     # On a linear scale a unit may be anything; the prior says what counts as much.
     return step if c.log or math.isinf(c.prior_sd) else step * max(1.0, c.prior_sd)
 

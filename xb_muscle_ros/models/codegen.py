@@ -13,7 +13,7 @@ from xb_muscle_ros.models.composition import INPUTS, OUTPUTS, Equations, Model
 from xb_muscle_ros.models.elimination import Elimination
 from xb_muscle_ros.models.factoring import replaced
 from xb_muscle_ros.models.program import Program, jacobian, program, python
-from xb_muscle_ros.stepping import ros3
+from xb_muscle_ros.stepping import rosenbrock3
 from xb_muscle_ros.symbolic.symbols import CALLS
 
 _HEADER = '''"""Generated from the mechanisms of model {name}{smooth}; do not edit."""
@@ -56,7 +56,13 @@ def flat_module(model: Model, smooth: bool) -> str:
     shared = program(all_rates(e), "t")
     prepare = function("prepare(p)", "Parameters and what is computed from them once.", ["return p.copy()"])
     stay = function("regrid(s, p, work)", "Moments need no grid.", ["pass"])
-    parts = [header(model, smooth, ros3.ORDER, interpolated=True), prepare, stay, _rhs(e, shared), _attempt(e, shared)]
+    parts = [
+        header(model, smooth, rosenbrock3.ORDER, interpolated=True),
+        prepare,
+        stay,
+        _rhs(e, shared),
+        _attempt(e, shared),
+    ]
     parts += [_slope(e), vector("rest", e.parameters, e.rest), _outputs(e), _violation(e, smooth)]
     return "\n\n".join(parts) + "\n\n\n" + kernels() + "\n"
 
@@ -138,7 +144,7 @@ def _attempt(e: Equations, body: Program) -> str:
     first, entries = flat.results[:n], flat.results[n:]
     solver = Elimination([[entries[i * n + j] != 0 for j in range(n)] for i in range(n)])
     lines = [*_states(e), *computed(e.parameters, flat)]
-    lines += ["per_h = 1.0 / h", f"diagonal = per_h * {1.0 / ros3.GAMMA!r}"]
+    lines += ["per_h = 1.0 / h", f"diagonal = per_h * {1.0 / rosenbrock3.GAMMA!r}"]
     for i, j in solver.entries():
         entry = entries[i * n + j]
         value = "" if entry == 0 else f" - ({python(entry)})"
@@ -146,19 +152,19 @@ def _attempt(e: Equations, body: Program) -> str:
     lines += solver.factor("a")
     lines += [f"f0_{i} = {python(r)}" for i, r in enumerate(first)]
     values, last_point = [f"f0_{i}" for i in range(n)], list[str]()
-    for stage in range(len(ros3.A)):
+    for stage in range(len(rosenbrock3.A)):
         k = f"k{stage}"
-        point = [_sum([starts[i]], ros3.A[stage], i) for i in range(n)]
+        point = [_sum([starts[i]], rosenbrock3.A[stage], i) for i in range(n)]
         if stage > 0 and point != last_point:
             lines.append(f"f{stage} = rates({', '.join(point)}, velocity, calcium, p)")
             values = [f"f{stage}[{i}]" for i in range(n)]
         last_point = point
         for i in range(n):
-            memory = _sum([], ros3.C[stage], i)
+            memory = _sum([], rosenbrock3.C[stage], i)
             lines.append(f"{k}_{i} = {values[i]}" + (f" + per_h * ({memory})" if memory else ""))
         lines += solver.solve("a", k)
-    lines += [f"e_{i} = {_sum([], ros3.E, i)}" for i in range(n)]
-    lines += [f"y_{i} = {_sum([starts[i]], ros3.M, i)}" for i in range(n)]
+    lines += [f"e_{i} = {_sum([], rosenbrock3.E, i)}" for i in range(n)]
+    lines += [f"y_{i} = {_sum([starts[i]], rosenbrock3.M, i)}" for i in range(n)]
     swap = {symbol: sympy.Symbol(f"y_{i}", real=True) for i, symbol in enumerate(variables)}
     arrival = program([replaced(x, swap) for x in e.arrival], "m")
     lines += [*computed((), arrival), *filled(arrival.results)]

@@ -17,7 +17,7 @@ from xb_muscle_ros.models.codegen import compiled_text, computed, function, head
 from xb_muscle_ros.models.composition import INPUTS, Composition
 from xb_muscle_ros.models.grid_equations import SUMS, GridEquations, grid_equations
 from xb_muscle_ros.models.program import program, python
-from xb_muscle_ros.stepping import ros2
+from xb_muscle_ros.stepping import rosenbrock2
 
 
 def grid_module(model: Composition, smooth: bool, remap: str) -> str:
@@ -31,14 +31,14 @@ def grid_module(model: Composition, smooth: bool, remap: str) -> str:
     e = grid_equations(model, smooth)
     index = {p.name: i for i, p in enumerate(e.parameters)}
     constants = (
-        f"GAMMA, ERROR_SHARE = {ros2.GAMMA!r}, {ros2.ERROR_SHARE!r}\n"
+        f"GAMMA, ERROR_SHARE = {rosenbrock2.GAMMA!r}, {rosenbrock2.ERROR_SHARE!r}\n"
         f"N_OTHERS, N_PARAMETERS, N_RATES = {len(e.states)}, {len(e.parameters)}, {len(e.leaving)}\n"
         f"TEARS = {any(torn for _, torn in e.leaving)!r}\n"
         f"TORN = {_torn_state(e)!r}\n"
         f"IS_STEP = {tuple(isinstance(rate, StepRate) for rate, _ in e.leaving)!r}\n"
         f"BINS, RANGE, REGRID = {index['bins']}, {index['strain_range']}, {index.get('regrid', -1)}\n"
     )
-    head = header(model, smooth, ros2.ORDER, interpolated=False)
+    head = header(model, smooth, rosenbrock2.ORDER, interpolated=False)
     parts = [head + constants, _rate_constants(e), _factors(e), _spreads(e), _leave(e)]
     parts += [_others(e), _couplings(e), vector("rest_of_others", e.parameters, e.rest), _output_scalars(e), _bounds(e)]
     parts.append(_kernels(remap))

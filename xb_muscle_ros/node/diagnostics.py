@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from xb_muscle_ros.models.registry import slack_of
 from xb_muscle_ros.node.inlet import Refused
-from xb_muscle_ros.node.inputs import Counts
+from xb_muscle_ros.node.rules import Counts
 from xb_muscle_ros.node.status import Status
 
 # A refusal that has lasted this long is no hiccup, s.
@@ -34,7 +34,7 @@ class Report:
         timeout_s: allowed age of the newest length sample; 0 for any.
         pushed: fibre and force (F0) of the strongest push since the last report; None where all pulled.
         now_s: steady time of the report, s.
-        refusing: see `xb_muscle_ros.node.inlet.Door`.
+        refusing: see `xb_muscle_ros.node.inlet.Inlet`.
         lost: messages that did not come since the last reset, in words, by topic.
         lost_new: how many since the last report, by topic.
     """

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
-from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.node.inputs import CALCIUM_UM, Counts, Names, Refusal, checked, stamp_ns
-from xb_muscle_ros.node.several import enumerated
+import numpy as np
+
+from xb_muscle_ros.node.names import Indices, Names, Places, enumerated, front
+from xb_muscle_ros.node.rules import CALCIUM_UM, Counts, Refusal, Trouble, inside, outside, stamp_ns
+from xb_muscle_ros.node.stepping import Floats, Stepping
 
 _WARN_EVERY_S = 5.0
 _NOT_AFTER = "stamp not after the last"
@@ -31,23 +33,30 @@ class Refused(NamedTuple):
     text: str
 
 
-class Door:
-    """What inlets for one fibre and for many share: whether they are open, and what they refused.
+class Inlet:
+    """Takes ``muscle/length`` and ``muscle/calcium``; a message may name some of the fibres.
+
+    What is wrong with the message refuses it whole, what is wrong with one fibre's value refuses that.
 
     Attributes:
         open: whether messages are taken; while closed they are dropped.
-        refused: how often input was refused, by reason.
+        refused: how often input was refused, by reason; each fibre's value counts.
         ignored_names: names that belong to no fibre here.
         last_length_s: steady time of the last length sample that was taken, s.
-        refusing: where nothing is taken any more: by topic, and name of the fibre or nothing for the whole message.
+        refusing: where nothing is taken any more: by topic, and name of the fibre, or nothing for the whole message and
+            in a node of one fibre.
     """
 
-    def __init__(self, logger: Any) -> None:
+    def __init__(self, fibres: Sequence[str], taker: Stepping, logger: Any) -> None:
+        """Be closed at first; `fibres` are names."""
         self.open = False
         self.refused = Counts()
         self.ignored_names = 0
         self.last_length_s: float | None = None
         self.refusing: dict[tuple[str, str], Refused] = {}
+        self._fibres = list(fibres)
+        self._names = Names(fibres)
+        self._taker = taker
         self._latched: set[int] = set()
         self._logger = logger
         self._warned: dict[str, float] = {}
@@ -57,122 +66,108 @@ class Door:
         self.refusing.clear()
         self._latched.clear()
 
-    def _is_repeated(self, stamp: int, refusal: Exception, latched: bool) -> bool:
-        """Whether calcium is refused for a stamp that is known only because two subscriptions bring the same."""
+    def take_length(self, message: Any) -> None:
+        """Callback of ``muscle/length``: position m, velocity m/s or none."""
+        places = self._places("length", message) if self.open else None
+        if places is None:
+            return
+        fibres, troubles = places.fibres, []
+        positions, velocities = _chosen(message.position, places), None
+        if message.velocity:
+            velocities = _chosen(message.velocity, places)
+            finite = np.isfinite(velocities)
+            if not finite.all():
+                for k in np.flatnonzero(~finite).tolist():
+                    troubles.append(Trouble(int(fibres[k]), Refusal("not finite", f"velocity is {velocities[k]}")))
+                fibres, positions, velocities = fibres[finite], positions[finite], velocities[finite]
+        if fibres.size:
+            troubles += self._taker.take_length(stamp_ns(message.header.stamp), fibres, positions, velocities)
+        if len(troubles) < places.fibres.size:
+            self.last_length_s = time.monotonic()
+        if troubles or self.refusing:
+            self._tell("length", places.fibres, troubles, troubles)
+
+    def take_calcium(self, message: Any, latched: bool = False) -> None:
+        """Callback of ``muscle/calcium``: position µM; `latched` where a publisher kept it for who listens late."""
+        places = self._places("calcium", message) if self.open else None
+        if places is None:
+            return
+        fibres, troubles = places.fibres, []
+        values = _chosen(message.position, places)
+        good = inside(values, CALCIUM_UM)
+        if not good.all():
+            for k in np.flatnonzero(~good).tolist():
+                refusal = outside(float(values[k]), CALCIUM_UM, "calcium", "µM")
+                troubles.append(Trouble(int(fibres[k]), refusal))
+            fibres, values = fibres[good], values[good]
+        stamp = stamp_ns(message.header.stamp)
+        if fibres.size:
+            troubles += self._taker.take_calcium(stamp, fibres, values)
+        # A stamp that is known only because two subscriptions bring the same is nothing to speak of.
         known = latched or stamp in self._latched
-        return known and isinstance(refusal, Refusal) and refusal.reason == _NOT_AFTER
-
-    def _remember(self, stamp: int) -> None:
-        if len(self._latched) < _LATCHED_KEPT:
+        told = [t for t in troubles if not (known and isinstance(t.error, Refusal) and t.error.reason == _NOT_AFTER)]
+        if latched and len(troubles) < places.fibres.size and len(self._latched) < _LATCHED_KEPT:
             self._latched.add(stamp)
+        if told or self.refusing:
+            self._tell("calcium", places.fibres, troubles, told)
 
-    def _taken(self, topic: str, whose: Iterable[str]) -> None:
-        """Something of these fibres is taken again."""
-        for name in ("", *whose):
-            self.refusing.pop((topic, name), None)
+    def _places(self, topic: str, message: Any) -> Places | None:
+        """Where the fibres of a message are; None where it has nothing for any of them, or is refused."""
+        try:
+            places = self._names.places(message.name, len(message.position), "position")
+            if places.new:
+                self.ignored_names += len(places.new)
+                here = f"fibre{'s' if len(self._fibres) > 1 else ''} {enumerated(self._fibres)}"
+                self._logger.warning(f"names ignored: {enumerated(places.new)}; this node has {here}")
+            if not places.fibres.size:
+                return None
+            if topic == "length" and message.velocity and len(message.velocity) != len(message.position):
+                told = f"{len(message.velocity)} velocities for {len(message.position)} positions"
+                raise Refusal("wrong array size", told)
+        except Refusal as refusal:
+            self._refuse(topic, refusal, [])
+            return None
+        return places
 
-    def _ignore(self, names: Sequence[str], here: str) -> None:
-        """Count names that are new, and say which fibres are here."""
-        self.ignored_names += len(names)
-        self._logger.warning(f"names ignored: {enumerated(names)}; this node has {here}")
+    def _tell(self, topic: str, fibres: Indices, troubles: Sequence[Trouble], told: Sequence[Trouble]) -> None:
+        """Count and say what is wrong, each reason once for all fibres that have it; the others are well again."""
+        bad = {trouble.fibre for trouble in troubles}
+        well = [i for i in fibres.tolist() if i not in bad]
+        if well or len(self._fibres) > 1:
+            for name in ("", *(self._fibres[i] for i in well)):
+                self.refusing.pop((topic, name), None)
+        by_reason: dict[str, list[tuple[int, Refusal]]] = {}
+        for i, error in told:
+            if isinstance(error, Refusal):
+                by_reason.setdefault(error.reason, []).append((i, error))
+            else:
+                self._logger.error(f"{front(self._fibres, [i], ' ')}stopped: {error}; call ~/reset to start again")
+        for alike in by_reason.values():
+            self._refuse(topic, alike[0][1], [i for i, _ in alike])
 
-    def _refuse(self, topic: str, refusal: Refusal, times: int = 1, whose: Sequence[str] = ()) -> None:
+    def _refuse(self, topic: str, refusal: Refusal, whose: Sequence[int]) -> None:
         """Count a refusal, and warn of its reason every few seconds.
 
         Args:
             topic: what the message was of.
             refusal: the first of its kind.
-            times: how many there are.
-            whose: names of fibres, where there are several.
+            whose: fibres that have it; empty: the whole message.
         """
         reason = refusal.reason
-        self.refused[reason] += times
+        self.refused[reason] += len(whose) or 1
         now = time.monotonic()
-        for name in whose or ("",):
+        names = [self._fibres[i] for i in whose] if len(self._fibres) > 1 else []
+        for name in names or [""]:
             before = self.refusing.get((topic, name))
             since_s, count = (now, 0) if before is None else before[:2]
             self.refusing[topic, name] = Refused(since_s, count + 1, str(refusal))
         if now - self._warned.get(reason, -math.inf) >= _WARN_EVERY_S:
             self._warned[reason] = now
-            of = f" of {enumerated(whose)}" if whose else ""
+            of = f" of {enumerated(names)}" if names else ""
             self._logger.warning(f"{topic}{of} refused ({reason}, {self.refused[reason]} so far): {refusal}")
 
 
-def check_velocities(message: Any) -> None:
-    """Check that a message has a velocity for each position, or none.
-
-    Raises:
-        Refusal: it has not.
-    """
-    if message.velocity and len(message.velocity) != len(message.position):
-        raise Refusal("wrong array size", f"{len(message.velocity)} velocities for {len(message.position)} positions")
-
-
-class Taker(Protocol):
-    """What both modes take."""
-
-    def take_calcium(self, stamp: int, calcium_um: float) -> None:
-        """Stamp in ns, free calcium in µM."""
-
-    def take_length(self, stamp: int, position_m: float, velocity_m_per_s: float | None) -> None:
-        """Stamp in ns, fibre length in m and its velocity in m/s or None."""
-
-
-class Inlet(Door):
-    """Takes ``muscle/length`` and ``muscle/calcium`` for one fibre."""
-
-    def __init__(self, fibre: str, taker: Taker, logger: Any) -> None:
-        super().__init__(logger)
-        self._names = Names(fibre)
-        self._alone = [fibre]
-        self._fibre = fibre
-        self._taker = taker
-
-    def take_length(self, message: Any) -> None:
-        """Callback of ``muscle/length``: position m, velocity m/s or none."""
-        if not self.open:
-            return
-        try:
-            index = self._index(message)
-            if index is None:
-                return
-            check_velocities(message)
-            velocity = None
-            if message.velocity:
-                velocity = message.velocity[index]
-                if not math.isfinite(velocity):
-                    raise Refusal("not finite", f"velocity is {velocity}")
-            self._taker.take_length(stamp_ns(message.header.stamp), message.position[index], velocity)
-            self.last_length_s = time.monotonic()
-            if self.refusing:
-                self._taken("length", ())
-        except Refusal as refusal:
-            self._refuse("length", refusal)
-        except UserError as error:
-            self._logger.error(f"stopped: {error}; call ~/reset to start again")
-
-    def take_calcium(self, message: Any, latched: bool = False) -> None:
-        """Callback of ``muscle/calcium``: position µM; `latched` where a publisher kept it for who listens late."""
-        if not self.open:
-            return
-        try:
-            index = self._index(message)
-            if index is not None:
-                calcium = checked(message.position[index], CALCIUM_UM, "calcium", "µM")
-                self._taker.take_calcium(stamp_ns(message.header.stamp), calcium)
-                if latched:
-                    self._remember(stamp_ns(message.header.stamp))
-                if self.refusing:
-                    self._taken("calcium", ())
-        except Refusal as refusal:
-            if not self._is_repeated(stamp_ns(message.header.stamp), refusal, latched):
-                self._refuse("calcium", refusal)
-
-    def _index(self, message: Any) -> int | None:
-        names = message.name
-        index = self._names.index(names, len(message.position), "position")
-        if names != self._alone:
-            new = self._names.news(names)
-            if new:
-                self._ignore(new, f"fibre {self._fibre}")
-        return index
+def _chosen(values: Any, places: Places) -> Floats:
+    """Values of a message in the order of the fibres found."""
+    array = np.array(values, dtype=np.float64)
+    return array if places.values is None else array[places.values]

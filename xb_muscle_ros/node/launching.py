@@ -7,11 +7,25 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from launch.actions import DeclareLaunchArgument
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.launch_description import LaunchDescription
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
+# Parameters that every launch file of a muscle node alone takes.
+OF_MUSCLES = {
+    "autostart": bool,
+    "fiber_file": str,
+    "model": str,
+    "mode": str,
+    "rate_hz": float,
+    "timeout_s": float,
+    "on_timeout": str,
+    "state_file": str,
+    "load_state_at_start": bool,
+    "use_sim_time": bool,
+}
 _LEVELS = ("debug", "info", "warn", "error", "fatal")
 
 
@@ -29,6 +43,39 @@ def common_arguments() -> list[DeclareLaunchArgument]:
         argument("respawn", "false", "start a node that ended again, after a second"),
         argument("autostart", "true", "configure and activate the muscle node without being asked"),
     ]
+
+
+def muscle_description(
+    name: str, rate_hz: str, own: Sequence[DeclareLaunchArgument], kinds: Mapping[str, type[Any]] = {}
+) -> LaunchDescription:
+    """A muscle node alone, with the arguments of `OF_MUSCLES` and `common_arguments`.
+
+    Args:
+        name, rate_hz: defaults of the arguments of these names.
+        own: arguments that differ between launch files, ``fiber_file`` and ``model`` among them.
+        kinds: types of those of them that are parameters and not in `OF_MUSCLES`.
+    """
+
+    def nodes(context: Any) -> list[Node]:
+        where = {key: LaunchConfiguration(key) for key in ("name", "namespace")}
+        return [node(context, "muscle_node", values({**OF_MUSCLES, **kinds}), **where)]
+
+    mode = "realtime: steps at rate_hz; lockstep: one step per length message"
+    on_timeout = "what happens then: length as sampled, length as it is, or that and calcium falling to zero"
+    arguments = [
+        *own,
+        argument("mode", "realtime", mode, ["realtime", "lockstep"]),
+        argument("rate_hz", rate_hz, "steps per second in realtime mode"),
+        argument("timeout_s", "0.0", "age at which a length sample is too old; 0: no age is"),
+        argument("on_timeout", "isometric", on_timeout, ["hold", "isometric", "decay"]),
+        argument("state_file", "", "file of ~/save_state and ~/load_state"),
+        argument("load_state_at_start", "false", "go on with what is in state_file"),
+        argument("use_sim_time", "false", "time comes from /clock"),
+        argument("name", name, "name of the node"),
+        argument("namespace", "", "namespace of the node and its topics"),
+        *common_arguments(),
+    ]
+    return LaunchDescription([*arguments, OpaqueFunction(function=nodes)])
 
 
 def values(kinds: Mapping[str, type[Any]]) -> dict[str, ParameterValue]:

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
@@ -12,23 +12,9 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.node.arrivals import Arrivals
+from xb_muscle_ros.node.inlet import Inlet
 from xb_muscle_ros.node.latched import Latched
 from xb_muscle_ros.node.qos_overrides import POLICIES
-
-
-class Inlet(Protocol):
-    """What takes the messages."""
-
-    open: bool
-
-    def take_length(self, message: Any) -> None:
-        """Callback of ``muscle/length``."""
-
-    def take_calcium(self, message: Any, latched: bool = False) -> None:
-        """Callback of ``muscle/calcium``; `latched`: from before the node listened, and may come twice."""
-
-    def forget(self) -> None:
-        """What comes from now on has nothing to do with what came before."""
 
 
 class Listening:

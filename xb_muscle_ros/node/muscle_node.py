@@ -20,26 +20,18 @@ from std_srvs.srv import Trigger
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.strain_bins import wide_bins_line
 from xb_muscle_ros.node.graph import Namesakes, survive_wrong_transitions
 from xb_muscle_ros.node.inlet import Inlet
-from xb_muscle_ros.node.inlet_many import InletOfMany
-from xb_muscle_ros.node.inputs import scale_of
 from xb_muscle_ros.node.listening import Listening, overridable
 from xb_muscle_ros.node.lockstep import Lockstep
-from xb_muscle_ros.node.lockstep_many import LockstepMany
-from xb_muscle_ros.node.memory import lock_memory, unlock_memory
-from xb_muscle_ros.node.outputs import OutputMessages, OutputMessagesMany
+from xb_muscle_ros.node.names import enumerated
+from xb_muscle_ros.node.outputs import OutputMessages
 from xb_muscle_ros.node.parameter_gate import ParameterGate
-from xb_muscle_ros.node.priority import drop_priority, take_priority
+from xb_muscle_ros.node.privileges import drop_priority, lock_memory, take_priority, unlock_memory
 from xb_muscle_ros.node.realtime import Realtime, Settings
-from xb_muscle_ros.node.realtime_many import RealtimeMany
 from xb_muscle_ros.node.reporter import Reporter
-from xb_muscle_ros.node.several import enumerated
-from xb_muscle_ros.node.state_file import StateFile
-
-_Many = LockstepMany | RealtimeMany
+from xb_muscle_ros.node.saved_state import StateFile
 
 
 class MuscleNode(LifecycleNode):
@@ -61,12 +53,12 @@ class MuscleNode(LifecycleNode):
         self.failure: UserError | None = None
         self._gate = ParameterGate(self, self._use_fibre, self._use_settings)
         self._mode: str = self._gate.value("mode")
-        self._stepping: Lockstep | Realtime | _Many | None = None
-        self._inlet: Inlet | InletOfMany | None = None
+        self._stepping: Lockstep | Realtime | None = None
+        self._inlet: Inlet | None = None
         self._listening: Listening | None = None
         # While the program starts the node, the caller tells what is wrong.
         self._starting = False
-        self._entities: list[tuple[Any, Any]] = []
+        self._outlets: list[Any] = []
         self._reporter = Reporter(self, self._mode)
         self.create_service(Trigger, "~/reset", self._on_reset)
         self._state_file = StateFile(
@@ -163,49 +155,28 @@ class MuscleNode(LifecycleNode):
         return super().on_error(state)
 
     def _connect(self, fibres: Sequence[Fibre]) -> None:
-        force, moments = (
-            self._outlet(self.create_lifecycle_publisher(JointState, topic, _output_qos(), **overridable()))
-            for topic in ("muscle/force", "muscle/moments")
-        )
+        self._outlets = [
+            self.create_lifecycle_publisher(JointState, f"muscle/{topic}", _output_qos(), **overridable())
+            for topic in ("force", "moments")
+        ]
         names = [fibre.name for fibre in fibres]
-        stepping: Lockstep | Realtime | _Many
-        inlet: Inlet | InletOfMany
-        outlet: OutputMessages | OutputMessagesMany
-        if self._gate.many:
-            all_messages = outlet = OutputMessagesMany(names, force, moments)
-            many = stepping = self._many(fibres, all_messages)
-            inlet = InletOfMany(names, many, self.get_logger())
-        else:
-            messages = outlet = OutputMessages(names[0], force, moments)
-            one = stepping = self._one(fibres[0], messages)
-            inlet = Inlet(names[0], one, self.get_logger())
-        self._stepping, self._inlet = stepping, inlet
+        outlet = OutputMessages(names, *self._outlets)
+        self._stepping = stepping = self._made(fibres, outlet)
+        self._inlet = inlet = Inlet(names, stepping, self.get_logger())
         self._listening = Listening(self, inlet, self._mode)
         self._reporter.watch(fibres, stepping, inlet, outlet, self._listening.arrivals)
 
-    def _one(self, fibre: Fibre, messages: OutputMessages) -> Lockstep | Realtime:
-        muscle = Muscle(fibre)
-        # The first settling loads what later ones need.
-        muscle.settle(0.0, 0.1)
-        scale, log = scale_of(fibre), self.get_logger()
-        if self._mode == "lockstep":
-            return Lockstep(muscle, scale, messages.publish, log, self._simulated_time)
-        return Realtime(muscle, scale, self._settings(), messages.publish, self._now_ns, log, self._simulated_time)
-
-    def _many(self, fibres: Sequence[Fibre], messages: OutputMessagesMany) -> _Many:
+    def _made(self, fibres: Sequence[Fibre], outlet: OutputMessages) -> Lockstep | Realtime:
         batch = MuscleBatch(fibres)
+        # The first settling loads what later ones need.
         batch.muscles[0].settle(0.0, 0.1)
         log = self.get_logger()
         if self._mode == "lockstep":
-            return LockstepMany(batch, messages.publish, log, self._simulated_time, self._gate.value("threads"))
-        return RealtimeMany(batch, self._settings(), messages.publish, self._now_ns, log, self._simulated_time)
+            return Lockstep(batch, outlet.publish, log, self._simulated_time, self._gate.value("threads"))
+        return Realtime(batch, self._settings(), outlet.publish, self._now_ns, log, self._simulated_time)
 
     def _now_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
-
-    def _outlet(self, publisher: Any) -> Any:
-        self._entities.append((publisher, self.destroy_lifecycle_publisher))
-        return publisher
 
     def _set_active(self, active: bool) -> None:
         self._gate.active = active
@@ -224,9 +195,9 @@ class MuscleNode(LifecycleNode):
     def _free(self) -> None:
         if self._listening is not None:
             self._listening.close()
-        for entity, destroy in self._entities:
-            destroy(entity)
-        self._entities.clear()
+        for publisher in self._outlets:
+            self.destroy_lifecycle_publisher(publisher)
+        self._outlets.clear()
         self._reporter.forget()
         self._stepping = None
         self._inlet = self._listening = None
@@ -246,18 +217,14 @@ class MuscleNode(LifecycleNode):
         return Settings(*(self._gate.value(name) for name in Settings._fields))
 
     def _use_settings(self) -> None:
-        if isinstance(self._stepping, (Realtime, RealtimeMany)):
+        if isinstance(self._stepping, Realtime):
             self._stepping.settings = self._settings()
-        elif isinstance(self._stepping, LockstepMany):
+        elif self._stepping is not None:
             self._stepping.threads = self._gate.value("threads")
 
     def _use_fibre(self, index: int, fibre: Fibre) -> None:
-        if isinstance(self._stepping, _Many):
+        if self._stepping is not None:
             self._stepping.replace(index, fibre)
-        elif self._stepping is not None:
-            # One assignment: a tick sees the old set or the new one, never a mixture.
-            self._stepping.muscle = Muscle(fibre)
-            self._stepping.next_scale = scale_of(fibre)
 
     def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self._stepping is None:
@@ -267,7 +234,7 @@ class MuscleNode(LifecycleNode):
         if self._listening is not None:
             self._listening.reset()
         response.success = True
-        constants = _constants([*self._gate.fibres.values()])
+        constants = _constants(self._gate.fibres)
         response.message = f"state forgotten after {account}; the next length sample settles anew; {constants}"
         return response
 

@@ -2,39 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import MutableSequence, Sequence
-from typing import Any, Protocol
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.models.muscle import Outputs
 from xb_muscle_ros.models.registry import PUSHES_F0
-from xb_muscle_ros.node.inputs import Scale
-from xb_muscle_ros.node.several import Floats, Indices
+from xb_muscle_ros.node.names import Indices
+from xb_muscle_ros.node.stepping import Floats
 from xb_muscle_ros.trials.simulated import MOMENTS
 
-
-class Publisher(Protocol):
-    """What is used of an rclpy publisher."""
-
-    def publish(self, msg: Any) -> None:
-        """Send a message."""
-
-    def get_subscription_count(self) -> int:
-        """How many listen."""
-
-
-def room(message: JointState, field: str, size: int) -> MutableSequence[float]:
-    """Array of a message's field with room for `size` values: what is put into it is in the message."""
-    setattr(message, field, [0.0] * size)
-    # The message keeps a copy of what it is given; only its own array is worth holding on to.
-    values: MutableSequence[float] = getattr(message, field)
-    return values
+_FORCE, _CE_LENGTH, _CE_VELOCITY, _FIRST = (
+    Outputs._fields.index(name) for name in ("force_f0", "ce_length_change_l0", "ce_velocity_l0_per_s", MOMENTS[0])
+)
+_MOMENTS = slice(_FIRST, _FIRST + len(MOMENTS))
+assert tuple(Outputs._fields[_MOMENTS]) == MOMENTS
 
 
 class OutputMessages:
-    """Publishes one fibre's force (``muscle/force``) and moments (``muscle/moments``).
+    """Publishes forces (``muscle/force``) and moments (``muscle/moments``), of all fibres in one message each.
 
     Force: effort, N; position and velocity of the contractile element, m and m/s. Moments: dimensionless, in position.
 
@@ -42,56 +30,8 @@ class OutputMessages:
         pushed: fibre and force (F0) of the strongest push since it was last cleared; None where all pulled.
     """
 
-    def __init__(self, fibre: str, force: Publisher, moments: Publisher) -> None:
-        self.pushed: tuple[str, float] | None = None
-        self._to_force = force
-        self._to_moments = moments
-        self._force = JointState()
-        self._force.name = [fibre]
-        self._position = room(self._force, "position", 1)
-        self._velocity = room(self._force, "velocity", 1)
-        self._effort = room(self._force, "effort", 1)
-        self._moments = JointState()
-        self._moments.name = [f"{fibre}/{name}" for name in MOMENTS]
-        self._values = room(self._moments, "position", len(MOMENTS))
-        self._first = Outputs._fields.index(MOMENTS[0])
-        assert Outputs._fields[self._first : self._first + len(MOMENTS)] == MOMENTS
-
-    def publish(self, stamp_ns: int, outputs: Outputs, scale: Scale) -> None:
-        """Send the outputs of one moment, stamped in ns."""
-        sec, nanosec = divmod(stamp_ns, 1_000_000_000)
-        for message in (self._force, self._moments):
-            stamp = message.header.stamp
-            stamp.sec, stamp.nanosec = sec, nanosec
-        if outputs.force_f0 < PUSHES_F0 and (self.pushed is None or outputs.force_f0 < self.pushed[1]):
-            self.pushed = self._force.name[0], outputs.force_f0
-        reference = scale.reference_length_m
-        self._effort[0] = outputs.force_f0 * scale.f0_n
-        self._position[0] = reference * (1.0 + outputs.ce_length_change_l0)
-        self._velocity[0] = reference * outputs.ce_velocity_l0_per_s
-        self._to_force.publish(self._force)
-        # Publishing is the dearest part of a tick; nobody misses what nobody listens to.
-        if self._to_moments.get_subscription_count():
-            first = self._first
-            for i in range(len(MOMENTS)):
-                self._values[i] = outputs[first + i]
-            self._to_moments.publish(self._moments)
-
-
-_FORCE, _CE_LENGTH, _CE_VELOCITY = (
-    Outputs._fields.index(name) for name in ("force_f0", "ce_length_change_l0", "ce_velocity_l0_per_s")
-)
-_MOMENTS = slice(Outputs._fields.index(MOMENTS[0]), Outputs._fields.index(MOMENTS[0]) + len(MOMENTS))
-
-
-class OutputMessagesMany:
-    """Publishes forces and moments of many fibres, all in one message each; see `OutputMessages`.
-
-    Attributes:
-        pushed: see `OutputMessages`.
-    """
-
-    def __init__(self, fibres: Sequence[str], force: Publisher, moments: Publisher) -> None:
+    def __init__(self, fibres: Sequence[str], force: Any, moments: Any) -> None:
+        """Fill messages of these fibres; `force` and `moments` are publishers of rclpy."""
         self.pushed: tuple[str, float] | None = None
         self._names = list(fibres)
         self._to_force = force
@@ -109,10 +49,12 @@ class OutputMessagesMany:
         """
         pair = self._all if which is None else _Pair([self._names[i] for i in which.tolist()])
         pair.fill(stamp_ns, outputs, scales)
-        least = outputs[:, _FORCE].min()
+        forces = outputs[:, _FORCE].tolist()
+        least = min(forces)
         if least < PUSHES_F0 and (self.pushed is None or least < self.pushed[1]):
-            self.pushed = pair.force.name[int(outputs[:, _FORCE].argmin())], float(least)
+            self.pushed = pair.force.name[forces.index(least)], least
         self._to_force.publish(pair.force)
+        # Publishing is the dearest part of a tick; nobody misses what nobody listens to.
         if self._to_moments.get_subscription_count():
             pair.fill_moments(stamp_ns, outputs)
             self._to_moments.publish(pair.moments)
@@ -126,29 +68,32 @@ class _Pair:
         self.force.name = list(fibres)
         self.moments.name = [f"{fibre}/{name}" for fibre in fibres for name in MOMENTS]
         self._position, self._velocity, self._effort = (
-            _array(self.force, field, len(fibres)) for field in ("position", "velocity", "effort")
+            array(self.force, field, len(fibres)) for field in ("position", "velocity", "effort")
         )
-        self._values = _array(self.moments, "position", len(self.moments.name))
+        self._values = array(self.moments, "position", len(self.moments.name))
 
     def fill(self, stamp_ns: int, outputs: Floats, scales: Floats) -> None:
-        """Put forces in, and the contractile elements' lengths and velocities, with the arithmetic of one fibre."""
-        _set_stamp(self.force, stamp_ns)
-        reference, f0 = scales[:, 0], scales[:, 1]
+        """Put forces in, and the contractile elements' lengths and velocities."""
+        set_stamp(self.force, stamp_ns)
+        reference, f0 = scales.T
         np.multiply(outputs[:, _FORCE], f0, out=self._effort)
         np.multiply(reference, 1.0 + outputs[:, _CE_LENGTH], out=self._position)
         np.multiply(reference, outputs[:, _CE_VELOCITY], out=self._velocity)
 
     def fill_moments(self, stamp_ns: int, outputs: Floats) -> None:
         """Put the moments in."""
-        _set_stamp(self.moments, stamp_ns)
+        set_stamp(self.moments, stamp_ns)
         self._values[:] = outputs[:, _MOMENTS].ravel()
 
 
-def _set_stamp(message: JointState, stamp_ns: int) -> None:
+def set_stamp(message: JointState, stamp_ns: int) -> None:
+    """Put a time in ns into a message."""
     stamp = message.header.stamp
     stamp.sec, stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
 
 
-def _array(message: JointState, field: str, size: int) -> Floats:
-    """`room` as an array of NumPy on the same memory."""
-    return np.frombuffer(room(message, field, size), dtype=np.float64)  # type: ignore[call-overload, no-any-return, unused-ignore]
+def array(message: JointState, field: str, size: int) -> Floats:
+    """Array of a message's field with room for `size` values: what is put into it is in the message."""
+    setattr(message, field, [0.0] * size)
+    # The message keeps a copy of what it is given; only its own memory is worth holding on to.
+    return np.frombuffer(getattr(message, field), dtype=np.float64)  # type: ignore[no-any-return, unused-ignore]

@@ -32,13 +32,13 @@ from xb_muscle_ros.node.parameters import (
     UNCONFIGURED,
     NotDeclared,
     check_fibre_parameter,
-    check_node_parameter,
+    check_value,
     fibre_descriptor,
     is_fibre_parameter,
     is_foreign,
     is_text,
     meant_as_number,
-    node_descriptor,
+    row_descriptor,
     unknown,
 )
 from xb_muscle_ros.node.qos_overrides import look_at_overrides
@@ -50,8 +50,6 @@ class ParameterGate:
     A node of one fibre has its parameters under their own names; a node of many has those of each under its name.
 
     Attributes:
-        fibres: what the parameters amount to, by the prefix of their parameters: empty for the fibre of a node of one,
-            its name and a dot for one of many. Empty while unconfigured.
         active: whether the node is active; the node keeps this up to date.
         error: what was wrong with the node's own parameters at the start; configuring then fails with it.
         on_fibre: called with the fibre's place and the new fibre when a physical parameter was set while configured.
@@ -60,17 +58,15 @@ class ParameterGate:
 
     def __init__(self, node: Any, on_fibre: Callable[[int, Fibre], None], on_settings: Callable[[], None]) -> None:
         """Take over what the command line and parameter files gave to a node that declared all of it as it came."""
-        self.fibres: dict[str, Fibre] = {}
         self.active = False
         self.error: UserError | None = None
         self.on_fibre = on_fibre
         self.on_settings = on_settings
         self._node = node
         self._own_hand = False
-        # Of every fibre, by the same prefix, then by flat name.
-        self._values: dict[str, dict[str, object]] = {}
-        # The same as the fibres' files alone have it.
-        self._of_file: dict[str, Mapping[str, object]] = {}
+        # By the prefix of their parameters: empty for the fibre of a node of one, its name and a dot for one of many.
+        # Empty while unconfigured.
+        self._made: dict[str, Configured] = {}
         self._derived: list[str] = []
         self._earlier: set[str] = set()
         self._given: dict[str, object] = {}
@@ -101,6 +97,11 @@ class ParameterGate:
         """Whether the parameters ask for many fibres (one, perhaps) rather than for the fibre of a node of one."""
         return any(any(self.value(name)) for name in ("fiber_files", "fibers"))
 
+    @property
+    def fibres(self) -> list[Fibre]:
+        """What the parameters amount to; empty while unconfigured."""
+        return [made.fibre for made in self._made.values()]
+
     def configure(self) -> list[Fibre]:
         """Build the fibres; their parameters, defaults included, are then declared.
 
@@ -109,12 +110,9 @@ class ParameterGate:
         """
         if self.error is not None:
             raise self.error
-        made = self._made()
-        self.fibres = {prefix: one.fibre for prefix, one in made.items()}
-        self._values = {prefix: one.values for prefix, one in made.items()}
-        self._of_file = {prefix: one.of_file for prefix, one in made.items()}
+        self._made = self._configured()
         self._leave_to_the_files()
-        shown = declared(self._values)
+        shown = declared({prefix: made.values for prefix, made in self._made.items()})
         with self._by_own_hand():
             for name, value in shown.items():
                 if self._node.has_parameter(name):
@@ -125,9 +123,9 @@ class ParameterGate:
             for name in {*self._came} - {*shown, *TEXTS}:
                 if self._node.has_parameter(name):
                     self._node.undeclare_parameter(name)
-        return list(self.fibres.values())
+        return self.fibres
 
-    def _made(self) -> Mapping[str, Configured]:
+    def _configured(self) -> dict[str, Configured]:
         file: str = self.value("fiber_file")
         given = on_top(self._given, self._came, bool(file) or self.many)
         if not self.many:
@@ -143,9 +141,7 @@ class ParameterGate:
     def release(self) -> None:
         """Back to what was given; parameters that came from a file are no longer declared."""
         self._leave_to_the_files()
-        self.fibres = {}
-        self._values = {}
-        self._of_file = {}
+        self._made = {}
         with self._by_own_hand():
             for name in self._derived:
                 if self._node.has_parameter(name):
@@ -158,10 +154,10 @@ class ParameterGate:
             value = row.default
             if name in overrides:
                 try:
-                    value = check_node_parameter(name, overrides[name])
+                    value = check_value(name, row, overrides[name])
                 except UserError as error:
                     self.error = self.error or error
-            self._node.declare_parameter(name, value, node_descriptor(name), ignore_override=True)
+            self._node.declare_parameter(name, value, row_descriptor(row), ignore_override=True)
 
     def _own_of(self, overrides: Mapping[str, object]) -> dict[str, object]:
         """What was given for fibres; keys of other nodes are left out."""
@@ -183,7 +179,7 @@ class ParameterGate:
 
     def _leave_to_the_files(self) -> None:
         """Forget what was given where a fibre's file says the same: with another file it would hide what that says."""
-        for name in said_by_files(self._given, self._of_file):
+        for name in said_by_files(self._given, {prefix: made.of_file for prefix, made in self._made.items()}):
             del self._given[name]
             if self._node.has_parameter(name) and name not in TEXTS:
                 self._derived.append(name)
@@ -227,8 +223,9 @@ class ParameterGate:
             for parameter in parameters:
                 name, value = parameter.name, parameter.value
                 if name in NODE_PARAMETERS:
-                    if check_node_parameter(name, value) != check_node_parameter(name, self.value(name)):
-                        self._check_moment(name, NODE_PARAMETERS[name].when)
+                    row = NODE_PARAMETERS[name]
+                    if check_value(name, row, value) != check_value(name, row, self.value(name)):
+                        self._check_moment(name, row.when)
                 elif is_fibre_parameter(name):
                     physical[name] = value
             self._check_fibre(physical)
@@ -238,24 +235,23 @@ class ParameterGate:
 
     def _check_moment(self, name: str, when: str) -> None:
         # Read-only ones are refused before this is asked.
-        wrong = (when == UNCONFIGURED and self.fibres) or (when == INACTIVE and self.active)
+        wrong = (when == UNCONFIGURED and self._made) or (when == INACTIVE and self.active)
         if wrong or when == START:
             remedy = "clean up first" if when == UNCONFIGURED else "deactivate first"
             raise UserError(f"parameter '{name}' can be set {when} only; {remedy}")
 
     def _check_fibre(self, new: dict[str, object]) -> None:
-        if not self.fibres:
+        if not self._made:
             for name, value in new.items():
                 if not is_text(name):
                     check_fibre_parameter(name, value)
             return
         for prefix, values in self._by_fibre(new).items():
-            old = self._values[prefix]
+            old, before = self._made[prefix].values, self._made[prefix].fibre.values
             for name, value in values.items():
                 if is_text(name) and value != old[name]:
                     self._check_moment(f"{prefix}{name}", UNCONFIGURED)
             fibre = fibre_from_parameters({**old, **values}, WHERE)
-            before = self.fibres[prefix].values
             if (fibre.values["smoothing"] > 0.0) != (before["smoothing"] > 0.0):
                 raise UserError(f"parameter 'smoothing' can be switched on or off {UNCONFIGURED} only; clean up first")
             for name in OF_GRIDS:
@@ -268,15 +264,15 @@ class ParameterGate:
         Raises:
             UserError: one that is common to many fibres.
         """
-        if "" in self.fibres:
+        if "" in self._made:
             return {"": dict(new)} if new else {}
         split: dict[str, dict[str, object]] = {}
         for name, value in new.items():
             head, _, rest = name.partition(".")
-            if f"{head}." in self.fibres:
+            if f"{head}." in self._made:
                 split.setdefault(f"{head}.", {})[rest] = value
             elif value != self.value(name):
-                own = f", or set that of one fibre, '{next(iter(self.fibres))}{name}'" if "." in name else ""
+                own = f", or set that of one fibre, '{next(iter(self._made))}{name}'" if "." in name else ""
                 raise UserError(f"parameter '{name}' is common to all fibres and can be set {UNCONFIGURED} only{own}")
         return split
 
@@ -284,16 +280,17 @@ class ParameterGate:
         if self._own_hand:
             return
         physical = {p.name: p.value for p in parameters if is_fibre_parameter(p.name)}
-        for prefix, values in self._by_fibre(physical).items() if self.fibres else ():
-            old = self._values[prefix]
+        for prefix, values in self._by_fibre(physical).items() if self._made else ():
+            old = self._made[prefix].values
             new = {name: value for name, value in values.items() if value != old.get(name)}
             if new:
                 old.update(new)
-                fibre = self.fibres[prefix] = fibre_from_parameters(old, WHERE)
-                self.on_fibre([*self.fibres].index(prefix), fibre)
+                fibre = fibre_from_parameters(old, WHERE)
+                self._made[prefix] = self._made[prefix]._replace(fibre=fibre)
+                self.on_fibre([*self._made].index(prefix), fibre)
             # What is set to what it is, as by loading a dump, is still the file's.
             self._given.update({f"{prefix}{name}": value for name, value in new.items()})
-        if not self.fibres:
+        if not self._made:
             self._given.update(physical)
         if any(p.name in NODE_PARAMETERS for p in parameters):
             self.on_settings()

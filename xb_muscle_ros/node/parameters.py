@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -14,6 +13,7 @@ from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter
 
 from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.mechanisms.base import Parameter as Physical
 from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked
 from xb_muscle_ros.node.foreign_keys import GROUPS, of_a_fibre
 from xb_muscle_ros.node.watchdog import DECAY, HOLD, ISOMETRIC
@@ -28,78 +28,74 @@ class Row(NamedTuple):
     """One parameter of the node."""
 
     default: Value
-    unit: str
     meaning: str
     when: str
-    lower: float = -math.inf
-    upper: float = math.inf
+    unit: str = ""
+    bounds: tuple[float, float] = (-math.inf, math.inf)
     choices: tuple[str, ...] = ()
 
 
-NODE_PARAMETERS: Mapping[str, Row] = MappingProxyType(
-    {
-        "autostart": Row(True, "", "configure and activate without being asked", START),
-        "mode": Row(
-            "realtime",
-            "",
-            "realtime: steps at rate_hz by the steady clock; lockstep: one step per length message, by its stamp",
-            START,
-            choices=("realtime", "lockstep"),
-        ),
-        "fiber_file": Row("", "", "fibre file, path or packaged fibre name; empty: parameters hold it", UNCONFIGURED),
-        "fiber_files": Row(
-            ("",), "", "one fibre file for each of many fibres, in order; empty: not many", UNCONFIGURED
-        ),
-        "fibers": Row(("",), "", "names of many fibres, as in the messages; empty: those of fiber_files", UNCONFIGURED),
-        "threads": Row(1, "", "threads that step many fibres, at most one for each core", INACTIVE, 1, 256),
-        "rate_hz": Row(1000.0, "Hz", "steps per second in realtime mode", INACTIVE, 10.0, 10000.0),
-        "extrapolate": Row(
-            False, "", "between length samples go on with their velocity instead of holding the length", ALWAYS
-        ),
-        "extrapolation_limit_s": Row(
-            0.02, "s", "longest time a length sample is carried on by its velocity; held afterwards", ALWAYS, 0.0, 1.0
-        ),
-        "max_catch_up": Row(
-            10, "ticks", "most ticks made up for at once after a late wake-up; more are dropped", ALWAYS, 0, 1000
-        ),
-        "timeout_s": Row(
-            0.0,
-            "s",
-            "age of the newest length sample beyond which on_timeout acts; 0: no age is too old",
-            ALWAYS,
-            0.0,
-            3600.0,
-        ),
-        "on_timeout": Row(
-            ISOMETRIC,
-            "",
-            "hold: length of the last sample; isometric: that of the fibre; decay: isometric, calcium falls to zero",
-            ALWAYS,
-            choices=(HOLD, ISOMETRIC, DECAY),
-        ),
-        "decay_s": Row(0.1, "s", "time constant of calcium with on_timeout decay", ALWAYS, 0.001, 1000.0),
-        "realtime_priority": Row(
-            0, "", "priority of the ticks' thread under SCHED_FIFO, where permitted; 0: ordinary", INACTIVE, 0, 99
-        ),
-        "lock_memory": Row(False, "", "keep the process in memory while active, where permitted", INACTIVE),
-        "state_file": Row("", "", "file that ~/save_state writes and ~/load_state reads", ALWAYS),
-        "load_state_at_start": Row(
-            False, "", "when configuring go on with the state in state_file, as ~/load_state does", UNCONFIGURED
-        ),
-    }
-)
+NODE_PARAMETERS: Mapping[str, Row] = {
+    "autostart": Row(True, "configure and activate without being asked", START),
+    "mode": Row(
+        "realtime",
+        "realtime: steps at rate_hz by the steady clock; lockstep: one step per length message, by its stamp",
+        START,
+        choices=("realtime", "lockstep"),
+    ),
+    "fiber_file": Row("", "fibre file, path or packaged fibre name; empty: parameters hold it", UNCONFIGURED),
+    "fiber_files": Row(("",), "one fibre file for each of many fibres, in order; empty: not many", UNCONFIGURED),
+    "fibers": Row(("",), "names of many fibres, as in the messages; empty: those of fiber_files", UNCONFIGURED),
+    "threads": Row(1, "threads that step many fibres, at most one for each core", INACTIVE, bounds=(1, 256)),
+    "rate_hz": Row(1000.0, "steps per second in realtime mode", INACTIVE, unit="Hz", bounds=(10.0, 10000.0)),
+    "extrapolate": Row(False, "between length samples go on with their velocity instead of holding the length", ALWAYS),
+    "extrapolation_limit_s": Row(
+        0.02,
+        "longest time a length sample is carried on by its velocity; held afterwards",
+        ALWAYS,
+        unit="s",
+        bounds=(0.0, 1.0),
+    ),
+    "max_catch_up": Row(
+        10,
+        "most ticks made up for at once after a late wake-up; more are dropped",
+        ALWAYS,
+        unit="ticks",
+        bounds=(0, 1000),
+    ),
+    "timeout_s": Row(
+        0.0,
+        "age of the newest length sample beyond which on_timeout acts; 0: no age is too old",
+        ALWAYS,
+        unit="s",
+        bounds=(0.0, 3600.0),
+    ),
+    "on_timeout": Row(
+        ISOMETRIC,
+        "hold: length of the last sample; isometric: that of the fibre; decay: isometric, calcium falls to zero",
+        ALWAYS,
+        choices=(HOLD, ISOMETRIC, DECAY),
+    ),
+    "decay_s": Row(0.1, "time constant of calcium with on_timeout decay", ALWAYS, unit="s", bounds=(0.001, 1000.0)),
+    "realtime_priority": Row(
+        0, "priority of the ticks' thread under SCHED_FIFO, where permitted; 0: ordinary", INACTIVE, bounds=(0, 99)
+    ),
+    "lock_memory": Row(False, "keep the process in memory while active, where permitted", INACTIVE),
+    "state_file": Row("", "file that ~/save_state writes and ~/load_state reads", ALWAYS),
+    "load_state_at_start": Row(
+        False, "when configuring go on with the state in state_file, as ~/load_state does", UNCONFIGURED
+    ),
+}
 
 # A state is of its grid: with another it would mean something else, or not fit.
 OF_GRIDS = ("bins", "strain_range")
 
-TEXTS: Mapping[str, str] = MappingProxyType(
-    {
-        "fibre": "name of the fibre, as in the messages",
-        "model": "parameter set in use, one of those under models",
-        "method": "representation of the cross-bridge distribution",
-        "source": "where the values come from",
-    }
-)
+TEXTS: Mapping[str, str] = {
+    "fibre": "name of the fibre, as in the messages",
+    "model": "parameter set in use, one of those under models",
+    "method": "representation of the cross-bridge distribution",
+    "source": "where the values come from",
+}
 
 
 def is_text(name: str) -> bool:
@@ -126,11 +122,6 @@ def of_muscle_node(name: str) -> bool:
     return name in NODE_PARAMETERS or name in TEXTS or any(part in GROUPS for part in name.split(".")[:2])
 
 
-def check_node_parameter(name: str, value: object) -> Value:
-    """`check_value` for a parameter of the node."""
-    return check_value(name, NODE_PARAMETERS[name], value)
-
-
 def check_value(name: str, row: Row, value: object) -> Value:
     """Return a value of the row's type; whole numbers may stand for floating ones.
 
@@ -150,10 +141,11 @@ def check_value(name: str, row: Row, value: object) -> Value:
         return value
     # A bool is a number too, and within infinite bounds.
     assert isinstance(value, (bool, int, float))
-    if not row.lower <= value <= row.upper:
-        unit = "" if row.unit in ("", "1") else f" {row.unit}"
+    lower, upper = row.bounds
+    if not lower <= value <= upper:
+        unit = f" {row.unit}" if row.unit else ""
         raise UserError(
-            f"parameter '{name}' is {value:g}{unit}; allowed is {row.lower:g} to {row.upper:g}{unit} ({row.meaning})"
+            f"parameter '{name}' is {value:g}{unit}; allowed is {lower:g} to {upper:g}{unit} ({row.meaning})"
         )
     return value
 
@@ -164,12 +156,16 @@ def check_fibre_parameter(name: str, value: object) -> float:
     Raises:
         UserError: the name is not known, or the value not allowed.
     """
+    key, table = _entry(name)
+    return checked(key, value, table, "parameters")
+
+
+def _entry(name: str) -> tuple[str, Mapping[str, Physical]]:
+    """A parameter of a fibre, or of one of many, by its name in one of the tables of all parameters, and the table."""
     head, _, rest = name.partition(".")
     if head not in GROUPS and rest:
         head, _, rest = rest.partition(".")
-    if head == "constants":
-        return checked(rest, value, CONSTANTS, "parameters")
-    return checked(rest.rpartition(".")[2], value, PARAMETERS, "parameters")
+    return (rest, CONSTANTS) if head == "constants" else (rest.rpartition(".")[2], PARAMETERS)
 
 
 def _texts(name: str, value: object) -> tuple[str, ...]:
@@ -216,39 +212,35 @@ def unknown(name: str, declared: Iterable[str]) -> UserError:
     return UserError(f"parameter '{name}' is not known{suggest(name, known)}")
 
 
-def node_descriptor(name: str) -> ParameterDescriptor:
-    """Descriptor of a parameter of the node."""
-    return row_descriptor(NODE_PARAMETERS[name])
-
-
 def row_descriptor(row: Row) -> ParameterDescriptor:
     """Descriptor of a parameter that a row describes."""
     unit = f" [{row.unit}]" if row.unit else ""
     descriptor = ParameterDescriptor(description=f"{row.meaning}{unit}; set {row.when}", read_only=row.when == START)
     if row.choices:
         descriptor.additional_constraints = f"one of: {', '.join(row.choices)}"
+    lower, upper = row.bounds
     if isinstance(row.default, float):
-        descriptor.floating_point_range = [FloatingPointRange(from_value=row.lower, to_value=row.upper)]
+        descriptor.floating_point_range = [FloatingPointRange(from_value=lower, to_value=upper)]
     elif isinstance(row.default, int) and not isinstance(row.default, bool):
-        descriptor.integer_range = [IntegerRange(from_value=int(row.lower), to_value=int(row.upper), step=1)]
+        descriptor.integer_range = [IntegerRange(from_value=int(lower), to_value=int(upper), step=1)]
     return descriptor
 
 
 def fibre_descriptor(name: str) -> ParameterDescriptor:
-    """Descriptor of a parameter of the fibre, such as ``models.3state_coop.f``, from the table of all parameters."""
+    """Descriptor of a parameter of a fibre, such as ``models.3state_coop.f``, from the table of all parameters.
+
+    Raises:
+        UserError: the name is not known.
+    """
     if is_text(name):
         meaning = TEXTS.get(name, "where the values of the set come from")
         return ParameterDescriptor(description=f"{meaning}; set {UNCONFIGURED}")
-    head, _, rest = name.partition(".")
-    if head not in GROUPS and rest:
-        # One of many fibres.
-        return fibre_descriptor(rest)
-    table, key = (CONSTANTS, rest) if head == "constants" else (PARAMETERS, rest.rpartition(".")[2])
-    when = f"set {UNCONFIGURED if key in OF_GRIDS else ALWAYS}"
-    if head == "constants":
-        when = "takes effect at the next reset"
+    key, table = _entry(name)
     if key not in table:
         raise UserError(f"parameter '{name}' is not known{suggest(key, table)}")
+    when = f"set {UNCONFIGURED if key in OF_GRIDS else ALWAYS}"
+    if table is CONSTANTS:
+        when = "takes effect at the next reset"
     row = table[key]
     return ParameterDescriptor(
         description=f"{row.meaning} [{row.unit}]; {when}; source: {row.source}",

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSPolicyKind, QoSReliabilityPolicy
@@ -53,7 +53,9 @@ def without_effect(given: Mapping[str, object], ends: Mapping[str, str]) -> list
         UserError: a policy or a value of one of the node's topics that ROS does not have.
     """
     found = []
-    for name, topic, end, policy in _split(given):
+    for name in (name for name in given if name.startswith(PREFIX)):
+        topic, _, rest = name.removeprefix(PREFIX).partition(".")
+        end, _, policy = rest.partition(".")
         if ends.get(topic) == end:
             _check(name, policy, given[name])
         elif topic not in _OF_ROS:
@@ -65,15 +67,6 @@ def told(names: list[str], node: str, ends: Mapping[str, str]) -> str:
     """What to say of overrides that have no effect."""
     known = ", ".join(f"{topic}.{end}" for topic, end in ends.items())
     return f"overrides without effect, {node} has none of these: {shortened(names)}; it has {known} (full names)"
-
-
-def _split(given: Mapping[str, object]) -> Iterator[tuple[str, str, str, str]]:
-    """Name, topic, end and policy of each override."""
-    for name in given:
-        if name.startswith(PREFIX):
-            topic, _, rest = name.removeprefix(PREFIX).partition(".")
-            end, _, policy = rest.partition(".")
-            yield name, topic, end, policy
 
 
 def _check(name: str, policy: str, value: object) -> None:

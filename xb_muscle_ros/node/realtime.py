@@ -2,33 +2,29 @@
 
 from __future__ import annotations
 
+import functools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import StateViolation, UserError
-from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.node.inputs import (
-    LENGTH_CHANGE_L0,
-    VELOCITY_L0_PER_S,
-    Counts,
-    Scale,
-    after,
-    checked,
-    length_change_l0,
-    went_back,
-)
-from xb_muscle_ros.node.lockstep import Emit
-from xb_muscle_ros.node.status import Account, Log, Snapshot, Status, time_went_back
+from xb_muscle_ros.models.batch import MuscleBatch
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.node.names import front
+from xb_muscle_ros.node.rules import Counts, Scale, scale_of
+from xb_muscle_ros.node.samples import Samples
+from xb_muscle_ros.node.status import Account, Log, Snapshot, Status, no_state
+from xb_muscle_ros.node.stepping import Emit, Flags, Floats, outputs, step, stopped, use_threads
 from xb_muscle_ros.node.ticker import Ticker
 from xb_muscle_ros.node.watchdog import Watchdog, unfed
 
+_REST_CALCIUM_UM = 0.1
+
 
 class Settings(NamedTuple):
-    """How the clock drives the fibre; all but rate, priority and threads may change between ticks."""
+    """How the clock drives the fibres; all but rate, priority and threads may change between ticks."""
 
     rate_hz: float
     extrapolate: bool
@@ -41,29 +37,23 @@ class Settings(NamedTuple):
     threads: int = 1
 
 
-class _Length(NamedTuple):
-    change_l0: float
-    velocity_l0_per_s: float | None
-    arrival_ns: int
-
-
 class Realtime:
     """Steps at absolute deadlines; between samples the length is held, or carried on by its velocity.
 
-    Callbacks put the newest input in place, the thread takes it from there; each is one reference, so neither waits for
-    the other. Where length stays away for longer than the settings allow, the watchdog takes its place.
+    A fibre joins once it has length and calcium, one that fails leaves until a reset. Fibres that take no part rest in
+    their places in the batch, unseen. Callbacks put the newest input in place, the thread takes it from there, all of
+    it by one reference, so neither waits for the other. Where length stays away for longer than the settings allow, the
+    watchdog takes its place.
 
     Attributes:
-        muscle: what is stepped; may be exchanged between ticks for one of the same model.
+        batch: what is stepped; fibres may be exchanged between ticks.
         settings: may be exchanged between ticks; the rate counts at the next start.
-        next_scale: becomes the scale in use at the next reset.
-        counts: what was odd about the input that was taken nevertheless.
+        take_calcium, take_length: see `Samples`.
     """
 
     def __init__(
         self,
-        muscle: Muscle,
-        scale: Scale,
+        batch: MuscleBatch,
         settings: Settings,
         emit: Emit,
         clock_ns: Callable[[], int],
@@ -73,203 +63,233 @@ class Realtime:
         """Keep what is needed; `start` starts.
 
         Args:
-            muscle, scale, settings: see above.
-            emit: called in the thread with stamp, outputs and scale.
+            batch, settings: see above.
+            emit: called in the thread for every answer.
             clock_ns: time of the output's stamps, ns.
             log: told when stepping stops, when length stays away and comes back (both in the thread), and when time
                 went back.
             simulated_time: whether the time of stamps may go back.
         """
-        self.muscle = muscle
+        self.batch = batch
         self.settings = settings
-        self.next_scale = scale
-        self.counts = Counts()
         self._emit = emit
         self._clock_ns = clock_ns
         self._log = log
-        self._simulated_time = simulated_time
         self._ticker = Ticker(self._ready, self._tick, self._done)
+        self._names = [muscle.fibre.name for muscle in batch.muscles]
+        scales = np.array([scale_of(muscle.fibre) for muscle in batch.muscles])
+        self._samples = Samples(self._names, scales, log, simulated_time)
+        self.take_calcium, self.take_length = self._samples.take_calcium, self._samples.take_length
+        # The thread's own; arrays are replaced, never changed, since callbacks read them.
+        self._rest = np.stack([muscle.rest() for muscle in batch.muscles])
+        self._rest[:, -1] = _REST_CALCIUM_UM
+        self._states = self._rest
+        self._use_live(np.zeros(len(batch), dtype=np.bool_))
+        self._faults: dict[int, str] = {}
+        self._watchdog = Watchdog(self._names, log)
+        self._scale_out = self._samples.inputs.scale
+        # Resets that were taken up, see `Inputs`.
+        self._run = self._samples.inputs.run
         self._ticks = 0
         self._violations = 0
-        self._calcium: float | None = None
-        self._state: npt.NDArray[np.float64] | None = None
-        self._account = Account()
-        self.reset()
+
+    @property
+    def counts(self) -> Counts:
+        """What was odd about the input that was taken nevertheless."""
+        return self._samples.counts
 
     def start(self) -> None:
         """Start the thread."""
         settings = self.settings
         period = round(1e9 / settings.rate_hz)
         self._dt = period * 1e-9
-        self._ticker.start(
-            period, lambda: self.settings.max_catch_up, settings.realtime_priority, self._log, lambda: None
-        )
+        begin = functools.partial(use_threads, self.batch, settings.threads)
+        priority = settings.realtime_priority
+        self._ticker.start(period, lambda: self.settings.max_catch_up, priority, self._log, begin)
 
     def stop(self) -> None:
         """End the thread at its next tick, and wait for that."""
         self._ticker.stop()
 
+    def replace(self, index: int, fibre: Fibre) -> None:
+        """Go on with other parameters of one fibre; its constants count from its next reset on."""
+        # One assignment: a tick sees the old set or the new one, never a mixture.
+        self.batch = self.batch.replaced(index, fibre)
+        self._samples.next_scale[index] = scale_of(fibre)
+
     def reset(self) -> Account:
-        """Forget state and stamps and start the statistics anew; the next length sample settles anew.
+        """Forget states and stamps and start the statistics anew; the next length samples settle anew.
 
-        The newest calcium is kept: it holds whatever the clock of the samples says. Returns what was taken until now.
+        The newest calcium is kept. Returns what was taken until now, over all fibres.
         """
-        account, self._account = self._account, Account()
-        self._length: _Length | None = None
-        self._length_stamp: int | None = None
-        self._calcium_stamp: int | None = None
-        self._scale = self.next_scale
+        taken = self._samples.taken.sum(axis=0).tolist()
+        self._samples.forget(np.arange(len(self._names)))
         # The thread takes the rest up at its next tick.
-        self._reset = True
         if not self._ticker.running:
-            self._begin_anew()
-        return account
+            self._take_up()
+        return Account(*taken)
 
-    def save(self) -> Snapshot:
-        """The state of the newest tick, and what drives it.
+    def save(self) -> tuple[Snapshot, ...]:
+        """One snapshot for each fibre: the state of the newest tick, and what drives it.
 
         Raises:
-            UserError: there is no state yet, or integration failed.
+            UserError: a fibre has no state yet, or has stopped.
         """
-        # Each is read once: the thread steps on meanwhile.
-        fault, state, calcium = self._fault, None if self._reset else self._state, self._calcium
-        if fault:
-            raise UserError(f"there is no state to save, stepping has stopped: {fault}; call ~/reset first")
-        if state is None or calcium is None:
-            raise UserError("there is no state to save yet: the fibre settles with the first length and calcium")
-        return Snapshot(state, self._scale_out, ((0, calcium),), None, None, self._account)
+        # The thread goes on meanwhile: it takes resets up in the reverse order, and a state is there before it is live.
+        run, live, states = self._run, self._live, self._states
+        faults, inputs, scales = self._faults, self._samples.inputs, self._scale_out
+        live = live & (inputs.run == run)
+        for i in range(len(self._names)):
+            if i in faults or not live[i]:
+                why = no_state(faults.get(i, ""), "the first length and calcium")
+                raise UserError(f"{front(self._names, [i], begin='fibre ')}{why}")
+        return tuple(
+            Snapshot(
+                states[i], Scale(*scales[i].tolist()), ((0, float(inputs.calcium_um[i])),), None, None, Account(*taken)
+            )
+            for i, taken in enumerate(self._samples.taken.tolist())
+        )
 
-    def load(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot, isometrically at the length that the fibre had until the next length sample comes.
+    def load(self, snapshots: Sequence[Snapshot]) -> None:
+        """Go on from snapshots, one for each fibre, isometrically at their lengths until the next length samples come.
 
         Stamps begin anew, whatever they were; the thread pauses for this.
         """
         running = self._ticker.running
         self.stop()
         self.reset()
-        self._account = snapshot.account
-        self._scale = self._scale_out = snapshot.scale
-        self._calcium = snapshot.calcium[-1][1]
-        self._length = _Length(float(snapshot.state[-3]), None, time.monotonic_ns())
-        self._state = snapshot.state
+        states = np.stack([snapshot.state for snapshot in snapshots])
+        scales = np.array([snapshot.scale for snapshot in snapshots])
+        samples, now = self._samples, time.monotonic_ns()
+        samples.taken = np.array([snapshot.account[:2] for snapshot in snapshots])
+        samples.inputs = samples.inputs._replace(
+            change_l0=states[:, -3].copy(),
+            velocity_l0_per_s=np.full(len(states), np.nan),
+            calcium_um=np.array([snapshot.calcium[-1][1] for snapshot in snapshots]),
+            arrival_ns=np.full(len(states), now, dtype=np.int64),
+            oldest_ns=now,
+            scale=scales,
+        )
+        self._states, self._scale_out = states, scales
+        self._use_live(np.ones(len(states), dtype=np.bool_))
         if running:
             self.start()
 
-    def take_calcium(self, stamp: int, calcium_um: float) -> None:
-        """Use a calcium sample (µM) from the next tick on; a stamp of 0 stands for an unstamped message.
-
-        Raises:
-            Refusal: the stamp is not after the last one.
-        """
-        if stamp != 0:
-            if went_back(stamp, self._calcium_stamp) and self._simulated_time():
-                self._calcium_stamp = None
-            self._calcium_stamp = after(stamp, self._calcium_stamp, "calcium")
-        self._calcium = calcium_um
-        self._account = self._account._replace(calcium=self._account.calcium + 1)
-
-    def take_length(self, stamp: int, position_m: float, velocity_m_per_s: float | None) -> None:
-        """Use a length sample (m, m/s or None) from the next tick on; a stamp of 0 stands for an unstamped message.
-
-        Raises:
-            Refusal: the sample cannot be integrated.
-        """
-        back = stamp != 0 and went_back(stamp, self._length_stamp) and self._simulated_time()
-        scale = self.next_scale if back else self._scale
-        change = length_change_l0(position_m, scale)
-        velocity = None
-        if velocity_m_per_s is not None:
-            velocity = checked(velocity_m_per_s / scale.reference_length_m, VELOCITY_L0_PER_S, "velocity", "L0/s")
-        if back:
-            self._begin_again(stamp)
-        if stamp != 0:
-            self._length_stamp = after(stamp, self._length_stamp, "length")
-        self._length = _Length(change, velocity, time.monotonic_ns())
-        self._account = self._account._replace(length=self._account.length + 1)
-
     def status(self) -> Status:
-        """How it goes."""
-        waiting = ""
-        if self._state is None:
-            missing = [n for n, v in (("length", self._length), ("calcium", self._calcium)) if v is None]
-            waiting = f"waiting for {' and '.join(missing)}" if missing else "settling"
+        """How it goes, over all fibres."""
+        inputs, live, faults = self._samples.inputs, self._live, self._faults
+        missing: dict[str, list[int]] = {}
+        lacking = [("length", np.isnan(inputs.change_l0)), ("calcium", np.isnan(inputs.calcium_um))]
+        for i in np.flatnonzero(~live).tolist():
+            if what := " and ".join(name for name, absent in lacking if absent[i]):
+                missing.setdefault(what, []).append(i)
+        waiting = [f"{front(self._names, which)}waiting for {what}" for what, which in missing.items()]
+        if not waiting and not self._all_live and not faults:
+            waiting.append("settling")
+        overdue = np.flatnonzero(self._watchdog.overdue & live).tolist()
+        ticker = self._ticker
         return Status(
             self._ticks,
             self._violations,
-            self._fault,
-            waiting,
-            self._ticker.lateness.summary(),
-            self._ticker.overruns,
-            self._ticker.dropped,
-            self.settings.on_timeout if self._watchdog.barking and self._state is not None else "",
+            stopped(self._names, faults),
+            "; ".join(waiting),
+            ticker.lateness.summary(),
+            ticker.overruns,
+            ticker.dropped,
+            f"{self.settings.on_timeout}{front(self._names, overdue, ')', ' (')}" if overdue else "",
             self._watchdog.timeouts,
         )
 
-    def _begin_again(self, stamp: int) -> None:
-        last = self._length_stamp
-        assert last is not None
-        self.counts["time went back"] += 1
-        self._log.warning(time_went_back(last, stamp, self.reset()))
+    def _use_live(self, live: Flags) -> None:
+        """Fibres that are stepped from now on, and, asked at every tick, whether those are any and all."""
+        self._live, self._any_live, self._all_live = live, bool(live.any()), bool(live.all())
 
-    def _begin_anew(self) -> None:
-        self._reset = False
-        self._scale_out = self._scale
-        self._state = None
-        self._fault = ""
-        self._ticker.forget()
-        self._watchdog = Watchdog(self._log)
+    def _take_up(self) -> None:
+        """Fibres that were reset are at rest from now on."""
+        inputs = self._samples.inputs
+        anew = inputs.run != self._run
+        self._use_live(self._live & ~anew)
+        self._states = np.where(anew[:, None], self._rest, self._states)
+        self._scale_out = np.where(anew[:, None], inputs.scale, self._scale_out)
+        self._faults = {i: fault for i, fault in self._faults.items() if not anew[i]}
+        self._watchdog.forget(anew)
+        if anew.all():
+            self._ticker.forget()
+        self._run = inputs.run
 
     def _ready(self) -> bool:
-        if self._reset:
-            self._begin_anew()
-        if self._state is None or self._fault:
-            self._settle()
-            return False
-        return True
+        if self._samples.inputs.run is not self._run:
+            self._take_up()
+        stepping = self._any_live
+        if not self._all_live:
+            inputs = self._samples.inputs
+            due = ~self._live & ~np.isnan(inputs.change_l0) & ~np.isnan(inputs.calcium_um)
+            for i in np.flatnonzero(due).tolist():
+                if i not in self._faults:
+                    self._settle(i, float(inputs.change_l0[i]), float(inputs.calcium_um[i]))
+        return stepping
 
-    def _done(self) -> None:
-        if self._state is not None and not self._fault and not self._reset:
-            # Of ticks made up for only the newest is worth sending.
-            self._emit(self._clock_ns(), self.muscle.outputs(self._state), self._scale_out)
-
-    def _settle(self) -> None:
-        length, calcium = self._length, self._calcium
-        if self._fault or length is None or calcium is None:
-            return
+    def _settle(self, i: int, change_l0: float, calcium_um: float) -> None:
+        states, live = self._states.copy(), self._live.copy()
         try:
-            self._state = self.muscle.settle(length.change_l0, calcium)
+            states[i], live[i] = self.batch.muscles[i].settle(change_l0, calcium_um), True
         except UserError as error:
-            self._fail(error)
+            self._fail(i, error)
+            return
+        self._states = states
+        self._use_live(live)
 
     def _tick(self, deadline_ns: int) -> None:
-        length, calcium = self._length, self._calcium
-        # A reset is taken up at the next tick; asked after the length is read, no new length meets the old state.
-        if self._reset or self._fault or self._state is None or length is None or calcium is None:
-            return
-        settings = self.settings
-        fed_ns = max(length.arrival_ns, self._ticker.begun_ns)
-        overdue_s = self._watchdog.overdue_s(fed_ns, deadline_ns, settings.timeout_s, settings.on_timeout)
-        if overdue_s > 0.0:
-            model = float(self._state[-3])
-            change, calcium = unfed(settings.on_timeout, overdue_s, settings.decay_s, length.change_l0, model, calcium)
-        else:
-            change = self._change_at(length, deadline_ns, settings)
+        inputs, settings, states, live = self._samples.inputs, self.settings, self._states, self._live
+        complete = self._all_live and inputs.run is self._run
+        if not complete:
+            # A reset is taken up at the next tick; until then no new length meets an old state.
+            live = live & (inputs.run == self._run)
+            if not live.any():
+                return
+        change, calcium = inputs.change_l0, inputs.calcium_um
+        if settings.extrapolate:
+            change = inputs.carried_on(deadline_ns, settings.extrapolation_limit_s)
+        watchdog, begun_ns = self._watchdog, self._ticker.begun_ns
+        overdue_s = watchdog.look(inputs, begun_ns, deadline_ns, settings.timeout_s, settings.on_timeout, live)
+        if overdue_s is not None:
+            held = unfed(settings.on_timeout, overdue_s, settings.decay_s, inputs.change_l0, states[:, -3], calcium)
+            change, calcium = (np.where(watchdog.overdue, *p) for p in zip(held, (change, calcium), strict=True))
+        if not complete:
+            change, calcium = np.where(live, change, states[:, -3]), np.where(live, calcium, _REST_CALCIUM_UM)
         try:
-            self._state = self.muscle.step(self._state, change, calcium, self._dt)
-        except UserError as error:
-            self._fail(error)
+            self._states = step(self.batch, states, change, calcium, self._dt)
+        except UserError:
+            self._one_by_one(states, change, calcium, live)
         self._ticks += 1
 
-    def _change_at(self, length: _Length, time_ns: int, settings: Settings) -> float:
-        if not settings.extrapolate or length.velocity_l0_per_s is None:
-            return length.change_l0
-        ahead = min(max((time_ns - length.arrival_ns) * 1e-9, 0.0), settings.extrapolation_limit_s)
-        change = length.change_l0 + length.velocity_l0_per_s * ahead
-        # Where the velocity would lead out of what is allowed, the sample itself is the better guess.
-        return change if LENGTH_CHANGE_L0[0] <= change <= LENGTH_CHANGE_L0[1] else length.change_l0
+    def _one_by_one(self, states: Floats, change: Floats, calcium: Floats, live: Flags) -> None:
+        stepped = states.copy()
+        for i in np.flatnonzero(live).tolist():
+            try:
+                stepped[i] = self.batch.muscles[i].step(states[i], float(change[i]), float(calcium[i]), self._dt)
+            except UserError as error:
+                stepped[i] = self._rest[i]
+                self._fail(i, error)
+        self._states = stepped
 
-    def _fail(self, error: UserError) -> None:
-        if isinstance(error, StateViolation):
-            self._violations += 1
-        self._fault = f"{error} (after {self._ticks * self._dt:.3f} s of stepping)"
-        self._log.error(f"stopped: {self._fault}; call ~/reset to start again")
+    def _done(self) -> None:
+        # Of ticks made up for only the newest is worth sending.
+        run, which = self._samples.inputs.run, None
+        if not (self._all_live and run is self._run):
+            which = np.flatnonzero(self._live & (run == self._run))
+            if not which.size:
+                return
+        table, scales = outputs(self.batch, None, self._states), self._scale_out
+        if which is not None:
+            table, scales = table[which], scales[which]
+        self._emit(self._clock_ns(), which, table, scales)
+
+    def _fail(self, i: int, error: UserError) -> None:
+        self._violations += isinstance(error, StateViolation)
+        text = f"{error} (after {self._ticks * self._dt:.3f} s of stepping)"
+        self._faults = {**self._faults, i: text}
+        live = self._live.copy()
+        live[i] = False
+        self._use_live(live)
+        self._log.error(f"{front(self._names, [i], ' ')}stopped: {text}; call ~/reset to start again")

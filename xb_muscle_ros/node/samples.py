@@ -1,34 +1,33 @@
-"""The newest samples of many fibres: written by callbacks, read by the thread that ticks."""
+"""The newest samples of a realtime node's fibres: put in place by callbacks, read by the thread that ticks."""
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.node.inputs import (
-    BACK_S,
+from xb_muscle_ros.node.names import Indices, front
+from xb_muscle_ros.node.rules import (
     LENGTH_CHANGE_L0,
-    LONGEST_GAP_S,
+    NO_STAMP,
     VELOCITY_L0_PER_S,
     Counts,
-    Refusal,
-    Scale,
-    after,
-    checked,
+    Trouble,
+    follows,
+    impossible_length,
+    inside,
     length_change_l0,
+    out_of_order,
+    outside,
+    went_back,
 )
-from xb_muscle_ros.node.several import Floats, Indices, Trouble, enumerated
 from xb_muscle_ros.node.status import Account, Log, time_went_back
+from xb_muscle_ros.node.stepping import Floats
 
-Flags = npt.NDArray[np.bool_]
 Stamps = npt.NDArray[np.int64]
-
-_NO_STAMP = -(2**63)
 
 
 class Inputs(NamedTuple):
@@ -36,23 +35,34 @@ class Inputs(NamedTuple):
 
     Attributes:
         change_l0, velocity_l0_per_s, calcium_um: velocity is NaN also where a sample came without.
-        arrival_ns: steady time of the length samples.
-        scale: shape (fibres, 2), see `scale_rows`.
+        arrival_ns, oldest_ns: steady time of the length samples, and of the oldest of them.
+        scale: in use, shape (fibres, 2): one L0 (m) and one F0 (N).
+        run: counts the resets of each fibre; the same array as long as there is none.
     """
 
     change_l0: Floats
     velocity_l0_per_s: Floats
     calcium_um: Floats
     arrival_ns: Stamps
+    oldest_ns: int
     scale: Floats
+    run: Stamps
+
+    def carried_on(self, time_ns: int, limit_s: float) -> Floats:
+        """Length changes carried on by their velocities, where there are any and they lead to what is allowed."""
+        ahead = np.minimum(np.maximum((time_ns - self.arrival_ns) * 1e-9, 0.0), limit_s)
+        change = self.change_l0 + self.velocity_l0_per_s * ahead
+        # Where the velocity would lead out of what is allowed, the sample itself is the better guess.
+        return np.where(inside(change, LENGTH_CHANGE_L0), change, self.change_l0)
 
 
 class Samples:
-    """Takes samples, refuses what cannot be used, and remembers which fibres are to settle anew.
+    """Takes samples, refuses what cannot be used, and counts resets, after which a fibre is to settle anew.
+
+    One thread writes; another may read `inputs` at any time, since it is replaced as one.
 
     Attributes:
-        inputs, pending: newest samples, and fibres (flags) that were reset since `take_up`; each replaced, never
-            changed. Reading both without the lock, read `inputs` first.
+        inputs: newest samples.
         next_scale: shape (fibres, 2), becomes the scale in use at a fibre's next reset.
         counts: what was odd about the input that was taken nevertheless.
         taken: length and calcium samples of each fibre since its last reset, shape (fibres, 2).
@@ -68,133 +78,92 @@ class Samples:
             simulated_time: whether the time of stamps may go back.
         """
         count = len(names)
-        none = np.full(count, np.nan)
+        none, zero = np.full(count, np.nan), np.zeros(count, dtype=np.int64)
+        self.inputs = Inputs(none, none, none, zero, 0, scale.copy(), zero)
         self.next_scale = scale
         self.counts = Counts()
-        self.inputs = Inputs(none, none, none, np.zeros(count, dtype=np.int64), scale.copy())
-        self.pending = np.ones(count, dtype=np.bool_)
         self.taken = np.zeros((count, 2), dtype=np.int64)
         self._names = names
         self._log = log
         self._simulated_time = simulated_time
-        # Callbacks replace inputs and ask for resets under it; the thread takes both up together.
-        self._lock = threading.Lock()
-        self._length_stamps = np.full(count, _NO_STAMP, dtype=np.int64)
+        self._length_stamps = np.full(count, NO_STAMP, dtype=np.int64)
         self._calcium_stamps = self._length_stamps.copy()
 
     def take_calcium(self, stamp: int, fibres: Indices, calcium_um: Floats) -> list[Trouble]:
         """Use calcium (µM) of some fibres from the next tick on; a stamp of 0 stands for an unstamped message."""
-        last = self._calcium_stamps[fibres]
-        if stamp != 0 and self._simulated_time():
-            last = np.where(_went_back(stamp, last), _NO_STAMP, last)
-        troubles, good = _in_order(stamp, last, fibres, "calcium")
-        if troubles:
-            fibres, calcium_um = fibres[good], calcium_um[good]
+        troubles: list[Trouble] = []
         if stamp != 0:
+            last = self._calcium_stamps[fibres]
+            good = follows(stamp, last)
+            if self._simulated_time():
+                good |= went_back(stamp, last)
+            if not good.all():
+                for k in np.flatnonzero(~good).tolist():
+                    troubles.append(Trouble(int(fibres[k]), out_of_order(stamp, int(last[k]), "calcium")))
+                fibres, calcium_um = fibres[good], calcium_um[good]
             self._calcium_stamps[fibres] = stamp
         values = self.inputs.calcium_um.copy()
         values[fibres] = calcium_um
         self.taken[fibres, 1] += 1
-        with self._lock:
-            self.inputs = self.inputs._replace(calcium_um=values)
+        self.inputs = self.inputs._replace(calcium_um=values)
         return troubles
 
     def take_length(
         self, stamp: int, fibres: Indices, position_m: Floats, velocity_m_per_s: Floats | None
     ) -> list[Trouble]:
         """Use lengths (m, m/s or None) of some fibres from the next tick on; see `take_calcium`."""
-        last = self._length_stamps[fibres]
-        back = np.zeros(len(fibres), dtype=np.bool_)
+        old, last, back = self.inputs, self._length_stamps[fibres], None
+        reference = old.scale[fibres, 0]
         if stamp != 0 and self._simulated_time():
-            back = _went_back(stamp, last)
-        troubles, good = _in_order(stamp, np.where(back, _NO_STAMP, last), fibres, "length")
-        reference = np.where(back, self.next_scale[fibres, 0], self.inputs.scale[fibres, 0])
-        change = position_m / reference - 1.0
-        rate = np.full(len(fibres), np.nan) if velocity_m_per_s is None else velocity_m_per_s / reference
-        fine = (change >= LENGTH_CHANGE_L0[0]) & (change <= LENGTH_CHANGE_L0[1])
+            back = went_back(stamp, last)
+            last = np.where(back, NO_STAMP, last)
+            reference = np.where(back, self.next_scale[fibres, 0], reference)
+        change = length_change_l0(position_m, reference)
+        good = inside(change, LENGTH_CHANGE_L0)
+        if stamp != 0:
+            good &= follows(stamp, last)
+        rate: Any = np.nan
         if velocity_m_per_s is not None:
-            fine &= (rate >= VELOCITY_L0_PER_S[0]) & (rate <= VELOCITY_L0_PER_S[1])
-        for k in np.flatnonzero(good & ~fine).tolist():
-            troubles.append(Trouble(int(fibres[k]), _why(position_m, velocity_m_per_s, reference, k)))
-        good &= fine
+            rate = velocity_m_per_s / reference
+            good &= inside(rate, VELOCITY_L0_PER_S)
+        troubles = []
         if not good.all():
-            fibres, change, rate, back, last = fibres[good], change[good], rate[good], back[good], last[good]
-        if back.any():
-            self._begin_again(stamp, fibres[back], int(last[back][0]))
+            for k in np.flatnonzero(~good).tolist():
+                why = outside(float(np.broadcast_to(rate, good.shape)[k]), VELOCITY_L0_PER_S, "velocity", "L0/s")
+                if stamp != 0 and not follows(stamp, int(last[k])):
+                    why = out_of_order(stamp, int(last[k]), "length")
+                elif not inside(change[k], LENGTH_CHANGE_L0):
+                    why = impossible_length(float(position_m[k]), float(reference[k]))
+                troubles.append(Trouble(int(fibres[k]), why))
+            fibres, change, rate = fibres[good], change[good], rate if velocity_m_per_s is None else rate[good]
+        if back is not None and (back & good).any():
+            self._begin_again(stamp, fibres[back[good]])
+            old = self.inputs
         if stamp != 0:
             self._length_stamps[fibres] = stamp
         self.taken[fibres, 0] += 1
-        old = self.inputs
         changes, rates, arrivals = old.change_l0.copy(), old.velocity_l0_per_s.copy(), old.arrival_ns.copy()
         changes[fibres], rates[fibres], arrivals[fibres] = change, rate, time.monotonic_ns()
-        with self._lock:
-            self.inputs = old._replace(change_l0=changes, velocity_l0_per_s=rates, arrival_ns=arrivals)
+        self.inputs = Inputs(changes, rates, old.calcium_um, arrivals, min(arrivals.tolist()), old.scale, old.run)
         return troubles
 
     def forget(self, which: Indices) -> None:
-        """Forget some fibres' lengths and states; newest calcium is kept, as in `Realtime.reset`."""
-        self._length_stamps[which] = self._calcium_stamps[which] = _NO_STAMP
+        """Forget some fibres' lengths and stamps.
+
+        The newest calcium is kept: it holds whatever the clock of the samples says.
+        """
+        self._length_stamps[which] = self._calcium_stamps[which] = NO_STAMP
         self.taken[which] = 0
         inputs = self.inputs
-        change, scale = inputs.change_l0.copy(), inputs.scale.copy()
+        change, scale, run = inputs.change_l0.copy(), inputs.scale.copy(), inputs.run.copy()
         change[which] = np.nan
         scale[which] = self.next_scale[which]
-        pending = self.pending.copy()
-        pending[which] = True
-        with self._lock:
-            self.inputs = inputs._replace(change_l0=change, scale=scale)
-            self.pending = pending
+        run[which] += 1
+        self.inputs = inputs._replace(change_l0=change, scale=scale, run=run)
 
-    def take_up(self) -> tuple[Inputs, Flags]:
-        """Newest inputs, and the fibres that were reset since the last call."""
-        with self._lock:
-            inputs, pending = self.inputs, self.pending
-            if pending.any():
-                self.pending = np.zeros_like(pending)
-        return inputs, pending
-
-    def put(self, inputs: Inputs) -> None:
-        """Go on with samples from elsewhere; stamps are as after a reset."""
-        with self._lock:
-            self.inputs = inputs
-
-    def _begin_again(self, stamp: int, back: Indices, last: int) -> None:
+    def _begin_again(self, stamp: int, back: Indices) -> None:
+        last = int(self._length_stamps[back[0]])
         taken = Account(*self.taken[back].sum(axis=0).tolist())
         self.counts["time went back"] += len(back)
-        who = enumerated([self._names[i] for i in back.tolist()])
-        self._log.warning(f"{who}: {time_went_back(last, stamp, taken)}")
+        self._log.warning(front(self._names, back.tolist()) + time_went_back(last, stamp, taken))
         self.forget(back)
-
-
-def _went_back(stamp: int, last: Stamps) -> Flags:
-    """`went_back` for many; stamps in ns."""
-    back: Flags = (last != _NO_STAMP) & (stamp < last - round(BACK_S * 1e9))
-    return back
-
-
-def _in_order(stamp: int, last: Stamps, fibres: Indices, what: str) -> tuple[list[Trouble], Flags]:
-    """Which fibres' stamps come after the last ones, as `after` has it; the others with their reasons."""
-    good = np.ones(len(fibres), dtype=np.bool_)
-    if stamp == 0:
-        return [], good
-    known = last != _NO_STAMP
-    good = ~known | ((last < stamp) & (last >= stamp - round(LONGEST_GAP_S * 1e9)))
-    troubles = []
-    for k in np.flatnonzero(~good).tolist():
-        try:
-            after(stamp, int(last[k]), what)
-        except Refusal as refusal:
-            troubles.append(Trouble(int(fibres[k]), refusal))
-    return troubles, good
-
-
-def _why(position_m: Floats, velocity_m_per_s: Floats | None, reference_m: Floats, k: int) -> Refusal:
-    """What is wrong with a fibre's sample that is out of bounds."""
-    reference = float(reference_m[k])
-    try:
-        length_change_l0(float(position_m[k]), Scale(reference, 1.0))
-        assert velocity_m_per_s is not None
-        checked(float(velocity_m_per_s[k]) / reference, VELOCITY_L0_PER_S, "velocity", "L0/s")
-    except Refusal as refusal:
-        return refusal
-    raise AssertionError("vector and scalar bounds differ")

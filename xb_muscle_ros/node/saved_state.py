@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn, Protocol
 
@@ -13,32 +13,19 @@ import numpy as np
 from xb_muscle_ros import __version__
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import write_text
+from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.node.inputs import Scale
-from xb_muscle_ros.node.status import Account, Snapshot
+from xb_muscle_ros.node.rules import Scale
+from xb_muscle_ros.node.status import Account, Log, Snapshot
 
-FORMAT = "xb_muscle_ros state 1"
-FORMAT_OF_MANY = "xb_muscle_ros states 1"
+# Of one fibre, and of many in a list.
+FORMATS = ("xb_muscle_ros state 1", "xb_muscle_ros states 1")
 
 
 class Stepping(Protocol):
     """What both modes can do."""
 
-    muscle: Muscle
-
-    def save(self) -> Snapshot:
-        """What is needed to go on."""
-
-    def load(self, snapshot: Snapshot) -> None:
-        """Go on with it."""
-
-
-class SteppingOfMany(Protocol):
-    """What both modes can do for many fibres."""
-
-    @property
-    def muscles(self) -> Sequence[Muscle]:
-        """One for each fibre."""
+    batch: MuscleBatch
 
     def save(self) -> Sequence[Snapshot]:
         """What is needed to go on, for each fibre."""
@@ -48,7 +35,7 @@ class SteppingOfMany(Protocol):
 
 
 def save_state(state_file: str, mode: str, stepping: Stepping) -> str:
-    """Write the state to a file that appears whole or not at all; returns what was done, in words.
+    """Write the states of all fibres to a file that appears whole or not at all; returns what was done, in words.
 
     The file is JSON. Python writes floats with as many digits as it takes to read the same bits back.
 
@@ -61,59 +48,46 @@ def save_state(state_file: str, mode: str, stepping: Stepping) -> str:
         UserError: no path, nothing to save, or the file cannot be written.
     """
     path = _path(state_file)
-    muscle, snapshot = stepping.muscle, stepping.save()
-    _write(path, {"format": FORMAT, "version": __version__, **_tree(muscle, mode, snapshot)})
-    return f"state of fibre {muscle.fibre.name} saved to {path} after {snapshot.account}"
+    muscles, snapshots = stepping.batch.muscles, stepping.save()
+    trees = [_tree(muscle, mode, snapshot) for muscle, snapshot in zip(muscles, snapshots, strict=True)]
+    alone = len(trees) == 1
+    tree = {"format": FORMATS[not alone], "version": __version__, **(trees[0] if alone else {"fibres": trees})}
+    try:
+        write_text(path, json.dumps(tree, indent=1) + "\n")
+    except (OSError, ValueError) as error:
+        raise UserError(f"state file {path} cannot be written: {error}; set parameter 'state_file'") from error
+    if alone:
+        return f"state of fibre {muscles[0].fibre.name} saved to {path} after {snapshots[0].account}"
+    return f"states of {len(trees)} fibres saved to {path}"
 
 
 def load_state(state_file: str, mode: str, stepping: Stepping) -> str:
-    """Go on with the state in a file; returns what was done, in words.
+    """Go on with the states in a file, for all fibres or for none; returns what was done, in words.
 
     Args:
         state_file, mode, stepping: see `save_state`.
 
     Raises:
-        UserError: no path, no such file, not a state file, or of another fibre, model, method, mode, or of other
+        UserError: no path, no such file, not a state file, or of other fibres, another model, method, mode, or of other
             parameter values (the bounds of a strain grid are among them).
     """
     path = _path(state_file)
-    muscle = stepping.muscle
-    tree = _read(path, FORMAT)
-    snapshot = _checked(path, tree, muscle, mode)
-    stepping.load(snapshot)
-    done = f"state of fibre {muscle.fibre.name} loaded from {path}, saved after {snapshot.account}"
-    return done + _other_version(tree)
-
-
-def save_states(state_file: str, mode: str, stepping: SteppingOfMany) -> str:
-    """As `save_state`, for all fibres of a node in one file."""
-    path = _path(state_file)
-    muscles, snapshots = stepping.muscles, stepping.save()
-    trees = [_tree(muscle, mode, snapshot) for muscle, snapshot in zip(muscles, snapshots, strict=True)]
-    _write(path, {"format": FORMAT_OF_MANY, "version": __version__, "fibres": trees})
-    return f"states of {len(trees)} fibres saved to {path}"
-
-
-def load_states(state_file: str, mode: str, stepping: SteppingOfMany) -> str:
-    """As `load_state`, for all fibres of a node, or for none where one does not fit."""
-    path = _path(state_file)
-    muscles = stepping.muscles
-    tree = _read(path, FORMAT_OF_MANY)
-    trees = tree.get("fibres")
+    muscles = stepping.batch.muscles
+    tree = _read(path)
+    trees = [tree] if tree["format"] == FORMATS[0] else tree.get("fibres")
     if not isinstance(trees, list) or not all(isinstance(entry, dict) for entry in trees):
         _damaged(path, "it has no list of fibres")
-    found, own = [entry.get("fibre") for entry in trees], [muscle.fibre.name for muscle in muscles]
-    _same(path, "fibres", found, own, "load it into a node that has the same, in the same order")
+    if len(trees) > 1 or len(muscles) > 1:
+        found, own = [entry.get("fibre") for entry in trees], [muscle.fibre.name for muscle in muscles]
+        _same(path, "fibres", found, own, "load it into a node that has the same, in the same order")
     snapshots = [_checked(path, entry, muscle, mode) for entry, muscle in zip(trees, muscles, strict=True)]
     stepping.load(snapshots)
-    return f"states of {len(trees)} fibres loaded from {path}" + _other_version(tree)
-
-
-def _write(path: Path, tree: Mapping[str, object]) -> None:
-    try:
-        write_text(path, json.dumps(tree, indent=1) + "\n")
-    except (OSError, ValueError) as error:
-        raise UserError(f"state file {path} cannot be written: {error}; set parameter 'state_file'") from error
+    done = f"states of {len(trees)} fibres loaded from {path}"
+    if len(trees) == 1:
+        done = f"state of fibre {muscles[0].fibre.name} loaded from {path}, saved after {snapshots[0].account}"
+    if tree.get("version") != __version__:
+        done += f", by version {tree.get('version')}; this is {__version__}, whose forces may differ"
+    return done
 
 
 def _tree(muscle: Muscle, mode: str, snapshot: Snapshot) -> dict[str, object]:
@@ -139,12 +113,6 @@ def _checked(path: Path, tree: Mapping[str, Any], muscle: Muscle, mode: str) -> 
     for name, value in own_values.items():
         _same(path, name, values[name], value, "set the parameter to the file's value first")
     return _snapshot(path, tree, muscle.state_names, lockstep=mode == "lockstep")
-
-
-def _other_version(tree: Mapping[str, Any]) -> str:
-    if tree.get("version") == __version__:
-        return ""
-    return f", by version {tree.get('version')}; this is {__version__}, whose forces may differ"
 
 
 def _path(state_file: str) -> Path:
@@ -175,7 +143,7 @@ def _same(path: Path, what: str, found: object, own: object, remedy: str) -> Non
         raise UserError(f"state file {path} has {what} = {found}, this node has {own}; {remedy}")
 
 
-def _read(path: Path, wanted: str) -> Mapping[str, Any]:
+def _read(path: Path) -> Mapping[str, Any]:
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -183,9 +151,10 @@ def _read(path: Path, wanted: str) -> Mapping[str, Any]:
     except ValueError as error:
         raise UserError(f"state file {path} is not JSON: {error}; give a file that ~/save_state wrote") from error
     found = tree.get("format") if isinstance(tree, dict) else None
-    if found != wanted:
+    if found not in FORMATS:
+        known = "' and '".join(FORMATS)
         raise UserError(
-            f"state file {path} has format {found!r}, known is '{wanted}'; give one that ~/save_state wrote"
+            f"state file {path} has format {found!r}, known are '{known}'; give one that ~/save_state wrote"
         )
     assert isinstance(tree, dict)
     return tree
@@ -208,3 +177,52 @@ def _snapshot(path: Path, tree: Mapping[str, Any], state_names: tuple[str, ...],
 
 def _damaged(path: Path, how: str) -> NoReturn:
     raise UserError(f"state file {path} is damaged: {how}; give one as ~/save_state wrote it")
+
+
+class StateFile:
+    """Saves and loads what a node steps."""
+
+    def __init__(self, mode: str, name: Callable[[], str], stepping: Callable[[], Stepping | None], log: Log) -> None:
+        """Know the mode of the node, and whom to ask for the file's name and what is stepped (None: nothing)."""
+        self._mode = mode
+        self._name = name
+        self._stepping = stepping
+        self._log = log
+
+    def on_save(self, request: Any, response: Any) -> Any:
+        """Callback of ``~/save_state``."""
+        return self._answer(response, save_state)
+
+    def on_load(self, request: Any, response: Any) -> Any:
+        """Callback of ``~/load_state``."""
+        return self._answer(response, load_state)
+
+    def load_at_start(self) -> None:
+        """Go on with the file where there is one; a line says what is done.
+
+        Raises:
+            UserError: no file is named, or it does not fit.
+        """
+        name = self._name()
+        if not name:
+            raise UserError("parameter 'load_state_at_start' is true, but 'state_file' is empty; name the file there")
+        if not Path(name).expanduser().exists():
+            self._log.warning(f"state file {name} does not exist yet: the fibre settles anew with its first samples")
+            return
+        self._log.info(self._done(load_state))
+
+    def _done(self, act: Callable[[str, str, Stepping], str]) -> str:
+        stepping = self._stepping()
+        if stepping is None:
+            raise UserError("the node is not configured; configure it first")
+        return act(self._name(), self._mode, stepping)
+
+    def _answer(self, response: Any, act: Callable[[str, str, Stepping], str]) -> Any:
+        try:
+            response.message = self._done(act)
+            response.success = True
+            self._log.info(response.message)
+        except UserError as error:
+            response.message = str(error)
+            self._log.error(response.message)
+        return response

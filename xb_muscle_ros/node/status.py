@@ -9,8 +9,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.node.inputs import Scale
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.node.lateness import LatenessSummary
+from xb_muscle_ros.node.rules import Scale
 
 
 class Log(Protocol):
@@ -81,6 +82,12 @@ def time_went_back(last: int, stamp: int, account: Account) -> str:
         f"length went back from {last * 1e-9:.9f} s to {stamp * 1e-9:.9f} s of simulated time: state forgotten after "
         f"{account}; the fibre settles anew"
     )
+
+
+def no_state(fault: str, needs: str) -> UserError:
+    """What to say where there is nothing to save: stepping has stopped, or a fibre still needs something to settle."""
+    why = f", stepping has stopped: {fault}; call ~/reset first" if fault else f" yet: the fibre settles with {needs}"
+    return UserError(f"there is no state to save{why}")
 
 
 class Snapshot(NamedTuple):

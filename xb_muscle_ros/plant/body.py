@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.plant.drives import FibreDrive, without_parallel
+from xb_muscle_ros.plant.drives import FibreDrive, beyond, without_parallel
 from xb_muscle_ros.plant.junction import Junction
 from xb_muscle_ros.plant.plant import Array, Plant
-from xb_muscle_ros.plant.reach import beyond
 from xb_muscle_ros.plant.translation import RampAndHold
 
 
@@ -37,7 +36,7 @@ class Body:
         self.fibre = without_parallel(fibre) if scene == "knee" else fibre
         torque = self.plant.constant("tone_nm") if scene == "knee" else self.plant.load_nm()
         drive = FibreDrive(self.plant, self.fibre, torque)
-        self.calcium_um = drive.activation
+        self.calcium_um = drive.calcium_um
         self._start_n = drive.pull()
         self._platform = platform if scene == "ankle" else None
         self._elastic = elastic

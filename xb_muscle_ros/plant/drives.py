@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre, changed
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.node.rules import LENGTH_CHANGE_L0
 from xb_muscle_ros.plant.plant import Array, Plant
 from xb_muscle_ros.plant.tendon import tendon_at
 
@@ -24,8 +25,8 @@ _MOST_PCA, _LEAST_PCA = 4.0, 8.0
 class Drive(Protocol):
     """Muscles of one plant, constantly activated."""
 
-    activation: dict[str, float]
-    """What holds the start, by muscle: free calcium in µM, or activation from 0 to 1."""
+    driven_by: dict[str, dict[str, float]]
+    """What holds the start: of each muscle ``calcium_um``, µM, or ``activation``, 0 to 1."""
 
     def pull(self) -> Array:
         """Set the plant's forces for the coming tick; return pulls on the tendons at this moment, (muscle,), N."""
@@ -60,7 +61,8 @@ class FibreDrive:
         target = wanted / float(plant.tendon_force_n(np.ones_like(force))[0])
         self._calcium[0] = self._calcium_for(target, float(lengths[0]))
         self._states[0] = self._muscle.settle(float(lengths[0]), self._calcium[0])
-        self.activation = {m.name: c for m, c in zip(plant.muscles, self._calcium, strict=True)}
+        self.calcium_um = {m.name: c for m, c in zip(plant.muscles, self._calcium, strict=True)}
+        self.driven_by = {"calcium_um": self.calcium_um}
         self._fibre_l0 = [float(length) for length in lengths]
         self._tendons = [
             tendon_at(self._muscle.outputs(state).force_f0 * math.cos(m.pennation_rad), m.tendon_slack_m)
@@ -163,7 +165,7 @@ class OwnDrive:
                 f"it needs activation {activation[0]:.4g}; allowed is 0 to 1; leave model 'mujoco' out"
             )
         plant.activate(activation)
-        self.activation = {m.name: float(a) for m, a in zip(plant.muscles, activation, strict=True)}
+        self.driven_by = {"activation": {m.name: float(a) for m, a in zip(plant.muscles, activation, strict=True)}}
 
     def pull(self) -> Array:
         """Nothing to set: MuJoCo computes the force within its step, with the velocity of the moment."""
@@ -194,3 +196,17 @@ def without_parallel(fibre: Fibre) -> Fibre:
 def pca(calcium_um: float) -> float:
     """-log10 of free calcium in mol/L."""
     return 6.0 - math.log10(calcium_um)
+
+
+def beyond(muscles: Sequence[str], length_l0: Array) -> str:
+    """Which muscle is longer or shorter than a fibre works; empty where none is.
+
+    Args:
+        muscles: names.
+        length_l0: length changes of their fibres, shape (muscle,).
+    """
+    least, most = LENGTH_CHANGE_L0
+    for name, change in zip(muscles, length_l0.tolist(), strict=True):
+        if not least <= change <= most:
+            return f"the fibre of {name} comes to {1.0 + change:.3f} L0, beyond {1.0 + least:g} to {1.0 + most:g} L0"
+    return ""

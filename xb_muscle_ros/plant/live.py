@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from types import TracebackType
+from contextlib import closing
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.node.link import Link
-from xb_muscle_ros.plant.drives import FibreDrive, without_parallel
+from xb_muscle_ros.node.client.link import Link
+from xb_muscle_ros.plant.drives import FibreDrive, beyond
 from xb_muscle_ros.plant.junction import Junction
-from xb_muscle_ros.plant.loop import DURATION_S, Trace, couple, move
+from xb_muscle_ros.plant.loop import Muscles
 from xb_muscle_ros.plant.muscle_end import MuscleEnd
 from xb_muscle_ros.plant.plant import Array, Plant
-from xb_muscle_ros.plant.reach import beyond
-from xb_muscle_ros.plant.translation import RampAndHold
 
 _ANSWER_S = 10.0
 
 
 class LiveDrive:
-    """Muscles that are the fibres of a `muscle_node` in lockstep; ends with the ``with`` block."""
+    """Muscles that are the fibres of a `muscle_node` in lockstep, until `close`."""
 
     def __init__(
         self,
@@ -45,13 +43,14 @@ class LiveDrive:
         """
         self._plant = plant
         self._tick = 0
-        self.activation = FibreDrive(plant, fibre, torque_nm).activation
+        calcium_um = FibreDrive(plant, fibre, torque_nm).calcium_um
+        self.driven_by = {"calcium_um": calcium_um}
         self._link = Link("plant", namespace, domain_id)
         try:
             self._end = MuscleEnd(self._link, plant.muscles, fibre, "lockstep")
             self._end.find()
             path = plant.length_change_l0()
-            self._force = self._end.settle(path, self.activation)
+            self._force = self._end.settle(path, calcium_um)
             self._junction = Junction(plant.muscles, path, self._force) if elastic else None
         except BaseException:
             self.close()
@@ -92,40 +91,13 @@ class LiveDrive:
         """Leave the graph."""
         self._link.close()
 
-    def __enter__(self) -> LiveDrive:
-        return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
+def over_ros(domain_id: int | None = None, namespace: str = "") -> Muscles:
+    """Muscles that are the fibres of a muscle node, for `run_ankle` and `run_knee`; arguments as for `LiveDrive`."""
 
+    def muscles(plant: Plant, fibre: Fibre | None, torque_nm: float, elastic: bool) -> closing[LiveDrive]:
+        if fibre is None:
+            raise UserError("MuJoCo's muscle is none of a muscle_node; give another model")
+        return closing(LiveDrive(plant, fibre, torque_nm, elastic, domain_id, namespace))
 
-def run_ankle_live(
-    fibre: Fibre,
-    platform: RampAndHold,
-    duration_s: float = DURATION_S["ankle"],
-    elastic: bool = False,
-    domain_id: int | None = None,
-    namespace: str = "",
-) -> Trace:
-    """`run_ankle` with a muscle node in place of models in this process; see `LiveDrive`."""
-    plant = Plant("ankle")
-    with LiveDrive(plant, fibre, plant.load_nm(), elastic, domain_id, namespace) as drive:
-        return couple(plant, fibre, drive, platform, duration_s)
-
-
-def run_knee_live(
-    fibre: Fibre,
-    moved_before: bool = False,
-    duration_s: float = DURATION_S["knee"],
-    elastic: bool = False,
-    domain_id: int | None = None,
-    namespace: str = "",
-) -> Trace:
-    """`run_knee` with a muscle node in place of models in this process; see `LiveDrive`."""
-    plant, bare = Plant("knee"), without_parallel(fibre)
-    with LiveDrive(plant, bare, plant.constant("tone_nm"), elastic, domain_id, namespace) as drive:
-        if moved_before:
-            move(plant, drive)
-        return couple(plant, bare, drive, None, duration_s, moved_before)
+    return muscles

@@ -3,18 +3,32 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 import numpy as np
 
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.plant.drives import OWN, Drive, FibreDrive, OwnDrive, without_parallel
+from xb_muscle_ros.node.rules import LENGTH_CHANGE_L0
+from xb_muscle_ros.plant.drives import OWN, Drive, FibreDrive, OwnDrive, beyond, without_parallel
 from xb_muscle_ros.plant.plant import Array, Plant
 from xb_muscle_ros.plant.translation import RampAndHold
 
 DURATION_S = {"ankle": 0.5, "knee": 4.0}
 MOVE_RAD, MOVE_S = 0.35, 1.0
 """Movement of the leg before its release: 20 degrees down and up again."""
+
+
+Muscles = Callable[[Plant, Fibre | None, float, bool], AbstractContextManager[Drive]]
+"""Makes the drive of a plant: takes the fibre (None: MuJoCo's muscle), the torque at the start (N·m), and whether
+tendons stretch."""
+
+
+@contextmanager
+def in_process(plant: Plant, fibre: Fibre | None, torque_nm: float, elastic: bool) -> Iterator[Drive]:
+    """Muscles in this process."""
+    yield OwnDrive(plant, torque_nm) if fibre is None else FibreDrive(plant, fibre, torque_nm, elastic)
 
 
 @dataclass(frozen=True)
@@ -25,7 +39,7 @@ class Trace:
         scene, model: names; the model's is that of a parameter set, or ``mujoco``.
         fibre: name, empty for ``mujoco``.
         moved_before: the leg was moved before it was released.
-        activation: of each muscle, constant; µM of calcium, or 0 to 1 for ``mujoco``.
+        driven_by: constant, of each muscle: ``calcium_um``, µM, or for ``mujoco`` ``activation``, 0 to 1.
         muscles: names, in the order of the columns below.
         time_s: shape (n,), from release or from the platform's first motion.
         angle_rad: shape (n,).
@@ -41,7 +55,7 @@ class Trace:
     model: str
     fibre: str
     moved_before: bool
-    activation: dict[str, float]
+    driven_by: dict[str, dict[str, float]]
     muscles: tuple[str, ...]
     time_s: Array
     angle_rad: Array
@@ -56,9 +70,26 @@ class Trace:
         """Model, and whether it was moved before."""
         return f"{self.model}, moved before" if self.moved_before else self.model
 
+    @property
+    def beyond(self) -> str:
+        """Which muscle's fibre was first beyond the lengths that a fibre has, and when; empty where none was."""
+        least, most = LENGTH_CHANGE_L0
+        outside = ~np.all((self.length_change_l0 >= least) & (self.length_change_l0 <= most), axis=1)
+        if not outside.any():
+            return ""
+        k = int(np.argmax(outside))
+        return (
+            f"{self.label}: {beyond(self.muscles, self.length_change_l0[k])}, from t = {self.time_s[k]:.3f} s on; "
+            "what comes after that is no muscle's answer, so take a shorter --duration or a smaller --displacement"
+        )
+
 
 def run_ankle(
-    fibre: Fibre | None, platform: RampAndHold, duration_s: float = DURATION_S["ankle"], elastic: bool = False
+    fibre: Fibre | None,
+    platform: RampAndHold,
+    duration_s: float = DURATION_S["ankle"],
+    elastic: bool = False,
+    muscles: Muscles = in_process,
 ) -> Trace:
     """Stand at equilibrium, constant calcium, then be moved.
 
@@ -67,38 +98,39 @@ def run_ankle(
         platform: how the ground moves.
         duration_s: of the run.
         elastic: tendons stretch; MuJoCo's muscle has none.
+        muscles: makes the drive.
 
     Raises:
         UserError: the stance cannot be held, no MuJoCo, or the muscle's integration fails.
     """
     plant = Plant("ankle", own_muscles=fibre is None)
-    return couple(plant, fibre, _drive(plant, fibre, plant.load_nm(), elastic), platform, duration_s)
+    with muscles(plant, fibre, plant.load_nm(), elastic) as drive:
+        return _couple(plant, fibre, drive, platform, duration_s)
 
 
 def run_knee(
-    fibre: Fibre | None, moved_before: bool = False, duration_s: float = DURATION_S["knee"], elastic: bool = False
+    fibre: Fibre | None,
+    moved_before: bool = False,
+    duration_s: float = DURATION_S["knee"],
+    elastic: bool = False,
+    muscles: Muscles = in_process,
 ) -> Trace:
     """Hold the leg level with a toned muscle, then let go. See `run_ankle`.
 
     Args:
-        fibre: see `run_ankle`.
-        moved_before: the hand that holds the leg first lowers and lifts it, as `move`.
+        fibre, elastic, muscles: see `run_ankle`.
+        moved_before: the hand that holds the leg first lowers and lifts it.
         duration_s: from the release.
-        elastic: see `run_ankle`.
     """
     plant = Plant("knee", own_muscles=fibre is None)
     bare = None if fibre is None else without_parallel(fibre)
-    drive = _drive(plant, bare, plant.constant("tone_nm"), elastic)
-    if moved_before:
-        move(plant, drive)
-    return couple(plant, bare, drive, None, duration_s, moved_before)
+    with muscles(plant, bare, plant.constant("tone_nm"), elastic) as drive:
+        if moved_before:
+            _move(plant, drive)
+        return _couple(plant, bare, drive, None, duration_s, moved_before)
 
 
-def _drive(plant: Plant, fibre: Fibre | None, torque_nm: float, elastic: bool) -> Drive:
-    return OwnDrive(plant, torque_nm) if fibre is None else FibreDrive(plant, fibre, torque_nm, elastic)
-
-
-def move(plant: Plant, drive: Drive) -> None:
+def _move(plant: Plant, drive: Drive) -> None:
     """Lower and lift the leg by `MOVE_RAD` in `MOVE_S` (one smooth cosine), and release it at once."""
     ticks = round(MOVE_S / plant.tick_s)
     for k in range(ticks):
@@ -110,7 +142,7 @@ def move(plant: Plant, drive: Drive) -> None:
     plant.place(plant.start_rad, 0.0)
 
 
-def couple(
+def _couple(
     plant: Plant,
     fibre: Fibre | None,
     drive: Drive,
@@ -118,16 +150,7 @@ def couple(
     duration_s: float,
     moved_before: bool = False,
 ) -> Trace:
-    """Step plant and muscles in turn.
-
-    Args:
-        plant: at its start.
-        fibre: see `run_ankle`.
-        drive: the plant's muscles, settled.
-        platform: how the ground moves; None: not at all.
-        duration_s: of the run.
-        moved_before: noted in the trace.
-    """
+    """Step plant, at its start, and settled muscles in turn; see `run_ankle`."""
     load = _load_stiffness(plant)
     count = round(duration_s / plant.tick_s) + 1
     muscles = len(plant.muscles)
@@ -149,7 +172,7 @@ def couple(
         model=OWN if fibre is None else fibre.model,
         fibre="" if fibre is None else fibre.name,
         moved_before=moved_before,
-        activation=drive.activation,
+        driven_by=drive.driven_by,
         muscles=tuple(m.name for m in plant.muscles),
         time_s=time,
         angle_rad=angle,

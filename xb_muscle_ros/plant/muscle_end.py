@@ -9,14 +9,14 @@ from collections.abc import Mapping
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.node.client.link import Link
+from xb_muscle_ros.node.client.wires import Sender, reliable
 from xb_muscle_ros.node.diagnostics import status_name
-from xb_muscle_ros.node.inputs import stamp_ns
-from xb_muscle_ros.node.link import Link
+from xb_muscle_ros.node.rules import stamp_ns
 from xb_muscle_ros.plant.plant import Architecture, Array
 
 FIND_S = 10.0
@@ -54,11 +54,9 @@ class MuscleEnd:
         self._names = [m.name for m in muscles]
         self._l0_m = np.array([m.l0_m for m in muscles])
         self._f0_n = np.array([m.f0_n for m in muscles])
-        qos = QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
-        self._length = link.node.create_publisher(JointState, "muscle/length", qos)
-        self._calcium = link.node.create_publisher(JointState, "muscle/calcium", qos)
+        self._length, self._calcium = (Sender(link.node, f"muscle/{t}", self._names) for t in ("length", "calcium"))
         self._inlets = (
-            link.node.create_subscription(JointState, "muscle/force", self._on_force, qos),
+            link.node.create_subscription(JointState, "muscle/force", self._on_force, reliable()),
             link.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10),
         )
 
@@ -81,13 +79,7 @@ class MuscleEnd:
         link, fibre = self._link, self._fibre
         link.find(timeout_s, self.command)
         wanted: dict[str, object] = {"mode": self._mode, "model": fibre.model, "method": fibre.method}
-        found = link.parameters([*wanted, *(f"{name}.constants.f0_n" for name in self._names)])
-        for name, value in wanted.items():
-            if found.get(name) != value:
-                raise UserError(
-                    f"node {link.peer} has {name} = {found.get(name, 'none')}, needed is {value}; end the node and "
-                    f"start another: {self.command}"
-                )
+        found = link.check(wanted, self.command, [f"{name}.constants.f0_n" for name in self._names])
         missing = [name for name in self._names if f"{name}.constants.f0_n" not in found]
         if missing:
             raise UserError(
@@ -105,15 +97,15 @@ class MuscleEnd:
         Raises:
             UserError: no answer.
         """
-        end = time.monotonic() + timeout_s
-        while time.monotonic() < end:
-            self._link.reset()
+
+        def send() -> None:
             self.forces.clear()
             self.send_calcium(0, calcium_um)
             self.send_length(0, length_l0)
-            if self._link.wait_for(lambda: 0 in self.forces, _HANDSHAKE_S):
-                return self.forces.pop(0)
-        raise UserError(f"node {self._link.peer} did not answer within {timeout_s:g} s; see its log")
+
+        if not self._link.begin(send, lambda: 0 in self.forces, timeout_s, _HANDSHAKE_S):
+            raise UserError(f"node {self._link.peer} did not answer within {timeout_s:g} s; see its log")
+        return self.forces.pop(0)
 
     def force(self, stamp: int, timeout_s: float) -> Array | None:
         """Forces of a stamp (ns) in F0, waited for; None where they do not come."""
@@ -122,14 +114,12 @@ class MuscleEnd:
 
     def send_length(self, stamp: int, length_l0: Array, velocity_l0_per_s: Array | None = None) -> None:
         """Publish length changes (L0) as lengths in m, with velocities where given; stamp in ns."""
-        message = self._message(stamp, (1.0 + length_l0) * self._l0_m)
-        if velocity_l0_per_s is not None:
-            message.velocity = (velocity_l0_per_s * self._l0_m).tolist()
-        self._length.publish(message)
+        velocity = None if velocity_l0_per_s is None else velocity_l0_per_s * self._l0_m
+        self._length.send(stamp, (1.0 + length_l0) * self._l0_m, velocity)
 
     def send_calcium(self, stamp: int, calcium_um: Mapping[str, float]) -> None:
         """Publish calcium (µM) by muscle; stamp in ns."""
-        self._calcium.publish(self._message(stamp, np.array([calcium_um[name] for name in self._names])))
+        self._calcium.send(stamp, np.array([calcium_um[name] for name in self._names]))
 
     def _parameters(self) -> dict[str, object]:
         fibre = self._fibre
@@ -139,11 +129,6 @@ class MuscleEnd:
             made[f"{name}.constants.f0_n"] = float(self._f0_n[i])
             made.update({f"{name}.models.{fibre.model}.{key}": value for key, value in fibre.values.items()})
         return made
-
-    def _message(self, stamp: int, values: Array) -> JointState:
-        message = JointState(name=self._names, position=values.tolist())
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
-        return message
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:

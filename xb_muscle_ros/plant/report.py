@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.files import write_text
-from xb_muscle_ros.plant.drives import OWN
 from xb_muscle_ros.plant.loop import Trace
 
 STIFFNESS_AT_S = (0.02, 0.05, 0.1)
@@ -136,7 +135,7 @@ def write(out: Path, traces: Sequence[Trace], settings: dict[str, object]) -> li
             "moved_before": trace.moved_before,
             "fibre": trace.fibre or None,
             # MuJoCo's own muscle is driven by activation, 0 to 1, the fibre's models by free calcium.
-            ("activation" if trace.model == OWN else "calcium_um"): trace.activation,
+            **trace.driven_by,
             "start_acceleration_rad_per_s2": trace.start_acceleration_rad_per_s2,
             "numbers": numbers(trace),
         }

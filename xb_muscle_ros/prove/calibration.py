@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.prove.counting import Score, share
+from xb_muscle_ros.prove.judging import JudgedComposite, JudgedName
 
 Array = npt.NDArray[np.float64]
 
@@ -51,25 +52,74 @@ def calibration_score(name: str, meaning: str, cases: Sequence[Sequence[Stated]]
     return Score(name, meaning, value, int(sums[..., 0].sum()), float(lower), float(upper), bar, True)
 
 
-def reliability(cases: Sequence[Sequence[Stated]]) -> list[dict[str, Any]]:
+def reliability(cases: Iterable[Iterable[Stated]], bins: int = BINS) -> list[dict[str, Any]]:
     """Bins that have statements: edges, mean probability, share right with its Clopper–Pearson interval."""
     statements = [stated for case in cases for stated in case]
-    places = _places(np.array([stated.probability for stated in statements]))
+    places = _places(np.array([stated.probability for stated in statements]), bins)
     rows = []
-    for place in range(BINS):
+    for place in range(bins):
         here = [stated for stated, at in zip(statements, places, strict=True) if at == place]
         if here:
             mean = float(np.mean([stated.probability for stated in here]))
             right = share("right", "", (stated.right for stated in here))
-            rows.append({"from": place / BINS, "to": (place + 1) / BINS, "mean_probability": mean, **right._asdict()})
+            rows.append({"from": place / bins, "to": (place + 1) / bins, "mean_probability": mean, **right._asdict()})
     return rows
 
 
-def _places(probability: Array) -> npt.NDArray[np.int64]:
+def of_composites(judged: Sequence[JudgedComposite]) -> list[Score]:
+    """Calibration errors of inclusion probabilities, as they are stated and in four other ways."""
+    error_of = "expected calibration error"
+    return [
+        calibration_score(
+            "calibration", f"{error_of} of inclusion probabilities, as stated",
+            [as_stated(j.statements) for j in judged], 0.05,
+        ),
+        calibration_score(
+            "calibration_components", f"{error_of}, every component by its family",
+            [by_family(j.statements) for j in judged],
+        ),
+        calibration_score(
+            "calibration_families", f"{error_of}, one statement for each family of a case",
+            [as_families(j.statements) for j in judged],
+        ),
+        calibration_score(
+            "calibration_exact", f"{error_of}, by name (components of one name)",
+            [as_stated(s for s in j.statements if s.single) for j in judged],
+        ),
+        calibration_score(
+            "calibration_artefacts", f"{error_of} of artefacts, by family",
+            [by_family(j.artefact_statements) for j in judged],
+        ),
+    ]  # fmt: skip
+
+
+def as_stated(statements: Iterable[JudgedName]) -> list[Stated]:
+    """Probabilities, each of what it says is there: a mechanism by name, a family of several by its family."""
+    known = ((s, s.exact_right if s.single else s.family_right) for s in statements)
+    return [Stated(s.probability, right) for s, right in known if s.probability is not None]
+
+
+def by_family(statements: Iterable[JudgedName]) -> list[Stated]:
+    """Probabilities, each right where an effect of its family is there."""
+    return [Stated(s.probability, s.family_right) for s in statements if s.probability is not None]
+
+
+def as_families(statements: Iterable[JudgedName]) -> list[Stated]:
+    """One probability for each family: that any of its components is there, if they are independent."""
+    absent: dict[str, float] = {}
+    right: dict[str, bool] = {}
+    for s in statements:
+        if s.probability is not None:
+            absent[s.family] = absent.get(s.family, 1.0) * (1.0 - s.probability)
+            right[s.family] = s.family_right
+    return [Stated(1.0 - probability, right[family]) for family, probability in absent.items()]
+
+
+def _places(probability: Array, bins: int = BINS) -> npt.NDArray[np.int64]:
     """Bin of each probability."""
     # Rounded, because 0.3 * 10 lies below 3 for a computer and 0.7 * 10 need not.
-    places = np.floor(np.round(probability * BINS, 9)).astype(np.int64)
-    return np.asarray(np.minimum(places, BINS - 1))
+    places = np.floor(np.round(probability * bins, 9)).astype(np.int64)
+    return np.asarray(np.minimum(places, bins - 1))
 
 
 def _sums(cases: Sequence[Sequence[Stated]]) -> Array:

@@ -1,108 +1,213 @@
-"""One diagnosis held against the key."""
+"""A diagnosis held against the key: by its first name where one thing is concealed, else name by name.
+
+Families: a name is of a right family if any effect of the case is of that family. A component with several members
+counts as one name and as one statement, by its family; it is never exactly right.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from xb_muscle_ros.diagnose.names import FAMILY, Name
 from xb_muscle_ros.diagnose.result import Verdict
-from xb_muscle_ros.prove.stated import NAMES, family_of, first_names, named, probability_of
+from xb_muscle_ros.prove.answers import Answer, Statement
 
 # A global change of rates is what parameters are for: to call it so is right as well.
 _AS_GOOD_AS_PARAMETERS = {Name.TEMPERATURE.value, Name.PHOSPHATE.value}
-NO_DIAGNOSIS = "error"
+_NAMES = frozenset(name.value for name in FAMILY)
 
 
-class Judged(NamedTuple):
+@dataclass(frozen=True)
+class Judged:
     """What became of a case.
 
     Attributes:
-        case: its name.
-        kind: ``null``, ``fault``, ``single``, ``pair`` or ``outside``.
-        labels: what is concealed.
-        size_f0: RMS that it leaves after a refit.
-        size_class_f0: the highest of 0.5, 1, 2 and 4 % F0 that this reaches, else 0; None for nulls and faults.
+        case, kind: see the key.
         verdict: of the tool, or ``error``.
-        answer: first name it gives, else its verdict.
-        physics: verdict ``physics``, or ``ambiguous`` with a mechanism among the names.
-        exact: the first name is right; for a pair either, for temperature and phosphate also ``parameters``, ``none``.
-        family: the first name is of a right family.
-        located: the first mismatch is where what a refit leaves is at least half as large as anywhere; None without.
-        located_beside_nuisances: the same with what a refit of constants and usual faults leaves.
+        physics: whether the tool says that physics is missing.
         gain: held-out gain over that of the true model; None unless before and after are known.
-        confidence: as the tool states it; in format 2 the inclusion probability of its first name.
+        worse: whether the answer predicts held-out conditions worse than the base; None where that is unknown.
         seconds: that the tool took.
     """
 
     case: str
     kind: str
+    verdict: str
+    physics: bool
+    gain: float | None
+    worse: bool | None
+    seconds: float | None
+
+    def says(self, *verdicts: Verdict) -> bool:
+        """Whether the verdict is one of these."""
+        return self.verdict in [verdict.value for verdict in verdicts]
+
+
+@dataclass(frozen=True)
+class JudgedSingle(Judged):
+    """What became of a case with one effect, a pair or none.
+
+    Attributes:
+        labels: what is concealed.
+        size_f0: RMS that it leaves after a refit.
+        size_class_f0: the highest of 0.5, 1, 2 and 4 % F0 that this reaches, else 0; None for nulls and artefacts.
+        answer: first name that the tool gives, else its verdict.
+        exact: the first name is right; for a pair either, for temperature and phosphate also ``parameters``, ``none``.
+        family: the first name is of a right family.
+        located: the first mismatch is where the residual of a refit is at least half as large as anywhere; None
+            without mismatch.
+        located_beside_nuisances: the same with a refit of constants and nuisance parameters.
+        confidence: inclusion probability of the first name; in format 1 as the tool states it.
+    """
+
     labels: tuple[str, ...]
     size_f0: float
     size_class_f0: float | None
-    verdict: str
     answer: str
-    physics: bool
     exact: bool
     family: bool
     located: bool | None
     located_beside_nuisances: bool | None
-    gain: float | None
     confidence: float | None
-    seconds: float | None
 
 
-def judge(truth: Mapping[str, Any], found: Mapping[str, Any]) -> Judged:
-    """Hold a diagnosis against the truth.
+class JudgedEffect(NamedTuple):
+    """What became of a mechanism that is concealed.
 
-    Args:
-        truth: a case of the key.
-        found: what `prove.run.needed` keeps of its diagnosis, or its error.
+    Attributes:
+        label: its name.
+        family: its family.
+        size_f0: its unique contribution, F0.
+        family_found: a name of its family is in the answer.
+        exact_found: its name is.
     """
-    labels = tuple(truth["labels"])
-    verdict = NO_DIAGNOSIS if "error" in found else str(found["verdict"])
-    names = first_names(found, verdict)
-    speaks = verdict in (Verdict.PHYSICS.value, Verdict.MEASUREMENT.value, Verdict.AMBIGUOUS.value)
-    first = names[0] if names and speaks else None
-    exact = first in labels
-    families = {FAMILY[Name(label)] for label in labels if label in NAMES}
-    family = first is not None and family_of(first, found) in families
-    if speaks and first is None:
-        family = found.get("family") in families
-    if set(labels) & _AS_GOOD_AS_PARAMETERS and verdict in (Verdict.PARAMETERS.value, Verdict.NONE.value):
-        exact = family = True
-    return Judged(
-        case=str(truth["case"]),
-        kind=str(truth["kind"]),
+
+    label: str
+    family: str
+    size_f0: float
+    family_found: bool
+    exact_found: bool
+
+
+class JudgedName(NamedTuple):
+    """A name that was given, or a component with its probability.
+
+    Attributes:
+        name, family, single, probability: as stated, see `Statement`.
+        family_right: an effect of this family is there.
+        exact_right: the effect itself is.
+    """
+
+    name: str
+    family: str
+    single: bool
+    probability: float | None
+    family_right: bool
+    exact_right: bool
+
+
+@dataclass(frozen=True)
+class JudgedComposite(Judged):
+    """What became of a composite.
+
+    Attributes:
+        trials: of its study.
+        effects: mechanisms that are concealed.
+        outside: effects without a name that are.
+        artefacts: of the measurement.
+        named: mechanisms of the answer.
+        artefacts_named: artefacts that the tool names.
+        statements: all mechanisms that it gives a probability.
+        artefact_statements: all such artefacts.
+    """
+
+    trials: int
+    effects: tuple[JudgedEffect, ...]
+    outside: tuple[str, ...]
+    artefacts: tuple[str, ...]
+    named: tuple[JudgedName, ...]
+    artefacts_named: tuple[JudgedName, ...]
+    statements: tuple[JudgedName, ...]
+    artefact_statements: tuple[JudgedName, ...]
+
+
+def judge(truth: Mapping[str, Any], found: Answer) -> JudgedSingle:
+    """Hold a diagnosis against the truth of a case of singles."""
+    labels, first = tuple(truth["labels"]), found.first
+    families = {FAMILY[Name(label)] for label in labels if label in _NAMES}
+    silent = (Verdict.PARAMETERS.value, Verdict.NONE.value)
+    as_good = bool(set(labels) & _AS_GOOD_AS_PARAMETERS) and found.verdict in silent
+    speaks = found.verdict in (Verdict.PHYSICS.value, Verdict.MEASUREMENT.value, Verdict.AMBIGUOUS.value)
+    family = first.family if first is not None else found.family if speaks else None
+    ambiguous = found.verdict == Verdict.AMBIGUOUS.value and bool(found.named_mechanisms)
+    return JudgedSingle(
+        **_common(truth, found, ambiguous),
         labels=labels,
         size_f0=float(truth["size_f0"]),
         size_class_f0=truth["size_class_f0"],
-        verdict=verdict,
-        answer=first or verdict,
-        physics=verdict == Verdict.PHYSICS.value
-        or (verdict == Verdict.AMBIGUOUS.value and bool(named(found, mechanisms=True))),
-        exact=exact,
-        family=family,
+        answer=found.verdict if first is None else first.name,
+        exact=as_good or (first is not None and first.name in labels),
+        family=as_good or family in families,
         located=_located(truth, found, "rms_f0"),
         located_beside_nuisances=_located(truth, found, "beside_nuisances_f0"),
-        gain=heldout_gain(truth, found),
-        confidence=found.get("confidence") if "components" not in found else probability_of(first or "", found),
-        seconds=found.get("seconds"),
+        confidence=found.confidence if found.mechanisms is None else None if first is None else first.probability,
     )
 
 
-def _located(truth: Mapping[str, Any], found: Mapping[str, Any], size: str) -> bool | None:
-    first = found.get("first_mismatch")
+def judge_composite(truth: Mapping[str, Any], found: Answer) -> JudgedComposite:
+    """Hold a diagnosis against the truth of a composite; one that failed says nothing."""
+    effects = [effect for effect in truth["effects"] if effect["family"] is not None]
+    mechanisms = {str(effect["label"]): str(effect["family"]) for effect in effects}
+    artefacts = {str(name): FAMILY[Name(name)] for name in truth["artefacts"]}
+    named = _judged(found.named_mechanisms, mechanisms)
+    families, names = {name.family for name in named}, {name.name for name in named if name.exact_right}
+    return JudgedComposite(
+        **_common(truth, found, bool(named)),
+        trials=int(truth["trials"]),
+        effects=tuple(
+            JudgedEffect(label, family, float(effect["unique_contribution_f0"]), family in families, label in names)
+            for effect, (label, family) in zip(effects, mechanisms.items(), strict=True)
+        ),
+        outside=tuple(str(effect["label"]) for effect in truth["effects"] if effect["family"] is None),
+        artefacts=tuple(artefacts),
+        named=named,
+        artefacts_named=_judged(found.named_artefacts, artefacts),
+        statements=_judged(found.mechanisms or (), mechanisms),
+        artefact_statements=_judged(found.artefacts or (), artefacts),
+    )
+
+
+def _common(truth: Mapping[str, Any], found: Answer, names_physics: bool) -> dict[str, Any]:
+    """What is judged alike, by the fields of `Judged`."""
+    before, after, noise = found.before_heldout_f0, found.after_heldout_f0, truth["noise_rms_f0"]
+    gain = worse = None
+    if before is not None and after is not None:
+        worse = after > before
+        gain = (before - after) / (before - noise) if noise is not None and before > noise else None
+    return {
+        "case": str(truth["case"]),
+        "kind": str(truth["kind"]),
+        "verdict": found.verdict,
+        "physics": found.verdict == Verdict.PHYSICS.value or names_physics,
+        "gain": gain,
+        "worse": worse,
+        "seconds": found.seconds,
+    }
+
+
+def _located(truth: Mapping[str, Any], found: Answer, size: str) -> bool | None:
     largest = max((cell[size] for cell in truth["cells"]), default=0.0)
-    if not first or largest <= 0.0:
+    if found.first_mismatch is None or largest <= 0.0:
         return None
-    here = [c[size] for c in truth["cells"] if c["trial"] == first["trial"] and c["phase"] == first["phase"]]
+    here = [c[size] for c in truth["cells"] if (c["trial"], c["phase"]) == found.first_mismatch]
     return bool(here) and max(here) >= 0.5 * largest
 
 
-def heldout_gain(truth: Mapping[str, Any], found: Mapping[str, Any]) -> float | None:
-    """Held-out gain over that of the true model; None unless before and after are known."""
-    before, after, noise = found.get("before_heldout_f0"), found.get("after_heldout_f0"), truth["noise_rms_f0"]
-    if before is None or after is None or noise is None or before <= noise:
-        return None
-    return float((before - after) / (before - noise))
+def _judged(statements: Iterable[Statement], truth: Mapping[str, str]) -> tuple[JudgedName, ...]:
+    """Statements against what is there, by name and family."""
+    return tuple(
+        JudgedName(*s, family_right=s.family in truth.values(), exact_right=s.single and s.name in truth)
+        for s in statements
+    )

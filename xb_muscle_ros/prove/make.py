@@ -4,24 +4,32 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import refuse_older, write_text
-from xb_muscle_ros.prove.sealing import BENCHMARK, COMPOSITES, SINGLES, digest, kind_of, load_benchmark, older_cases
+from xb_muscle_ros.prove.sealing import (
+    BENCHMARK,
+    COMPOSITES,
+    SINGLES,
+    VERSION,
+    digest,
+    kind_of,
+    load_benchmark,
+    older_cases,
+)
 from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.work import JsonValue, Options, stream
 
-VERSION = 2
 _STUDIES = "Studies of made fibres, each with its bags and a fibre file that was fitted to another fibre"
 _SEALED = "The key was sealed when the cases were made: its SHA-256 is below."
 _ABOUT = {
-    SINGLES: f"{_STUDIES}. In some something is concealed: a mechanism, an effect that has no name, or a fault of the "
-    f"measurement; in some nothing. {_SEALED}",
-    COMPOSITES: f"{_STUDIES}, all recorded with ordinary error of the measurement. In most something is concealed: one "
-    "mechanism or several, an effect that has no name, or artefacts of the measurement beyond the ordinary; in some "
+    SINGLES: f"{_STUDIES}. In some something is concealed: a mechanism, an effect that has no name, or a measurement "
+    f"artefact; in some nothing. {_SEALED}",
+    COMPOSITES: f"{_STUDIES}, all recorded with ordinary measurement artefacts. In most something is concealed: one "
+    "mechanism or several, an effect that has no name, or measurement artefacts beyond the ordinary; in some "
     f"nothing. {_SEALED}",
 }
 
@@ -53,12 +61,10 @@ def make(
     Raises:
         UserError: the folder holds another benchmark, the key lies in it, or a file cannot be written.
     """
-    if out.resolve() in key.resolve().parents:
-        raise UserError(f"key {key} lies within {out}, where the tool would find it; choose a file elsewhere")
     if (out / BENCHMARK).exists() and not overwrite:
+        _refuse_within(key, out)
         return _finished(out, cases, seed, key, kind)
-    refuse_older([] if not key.exists() else [key], overwrite)
-    remove_results(older_cases(out))
+    make_room(out, key, overwrite)
     tasks = [_task(out, number, cases, seed, method, kind) for number in range(1, cases + 1)]
     found: dict[int, Any] = dict(stream(_make_one, tasks, options))
     for index, task in enumerate(tasks):
@@ -68,18 +74,36 @@ def make(
     return seal(out, key, seed, [found[index] for index in range(cases)], _ABOUT[kind], method, kind)
 
 
+def make_room(out: Path, key: Path, overwrite: bool) -> None:
+    """Remove what an older benchmark left, if it may be.
+
+    Raises:
+        UserError: the key lies in the folder, or there is an older benchmark or key.
+    """
+    _refuse_within(key, out)
+    refuse_older([path for path in (out / BENCHMARK, key) if path.exists()], overwrite)
+    remove_results(older_cases(out))
+
+
+def _refuse_within(key: Path, out: Path) -> None:
+    if out.resolve() in key.resolve().parents:
+        raise UserError(f"key {key} lies within {out}, where the tool would find it; choose a file elsewhere")
+
+
 def seal(out: Path, key: Path, seed: int, entries: list[Any], about: str, method: str, kind: str = SINGLES) -> str:
     """Write the key and the benchmark's public description; returns the key's SHA-256."""
     salt = hashlib.sha256(f"salt of the key, seed {seed}".encode()).hexdigest()
-    # Keys of single effects stay what they were, to the last byte.
-    of_kind = {} if kind == SINGLES else {"kind": kind}
-    content = {"version": VERSION, **of_kind, "salt": salt, "seed": seed, "cases": entries}
+    content = {"version": VERSION, "kind": kind, "salt": salt, "seed": seed, "cases": entries}
     write_text(key, json.dumps(content, indent=1) + "\n")
     sealed = digest(key)
     public = {
-        "version": VERSION, **of_kind, "about": about, "method": method, "cases": [entry["case"] for entry in entries],
+        "version": VERSION,
+        "kind": kind,
+        "about": about,
+        "method": method,
+        "cases": [entry["case"] for entry in entries],
         "key_sha256": sealed,
-    }  # fmt: skip
+    }
     write_text(out / BENCHMARK, json.dumps(public, indent=1) + "\n")
     return sealed
 
@@ -105,31 +129,14 @@ def _task(out: Path, number: int, cases: int, seed: int, method: str, kind: str)
 
 def _make_one(task: Mapping[str, Any]) -> dict[str, JsonValue]:
     """Make one case, write what is public of it, and return what the key says."""
-    return _MAKERS[str(task["kind"])](task)
-
-
-def _single(task: Mapping[str, Any]) -> dict[str, JsonValue]:
-    from xb_muscle_ros.prove.generator.case import make_case
-    from xb_muscle_ros.prove.generator.mix import specs
+    from xb_muscle_ros.prove.generator import mix
+    from xb_muscle_ros.prove.generator.composite import make_composite
+    from xb_muscle_ros.prove.generator.single import make_single
     from xb_muscle_ros.prove.generator.writing import key_entry, write_case
 
-    number, folder = int(task["number"]), Path(task["out"])
-    spec = specs(int(task["cases"]), int(task["seed"]))[number - 1]
-    case = make_case(spec, int(task["seed"]), number)
+    number, seed, folder = int(task["number"]), int(task["seed"]), Path(task["out"])
+    composite = task["kind"] == COMPOSITES
+    specs = (mix.composites if composite else mix.singles)(int(task["cases"]), seed)
+    case = (make_composite if composite else make_single)(specs[number - 1], seed, number)
     write_case(folder, case, f"fibre_{number:04d}", str(task["method"]))
     return key_entry(case, folder.name)
-
-
-def _composite(task: Mapping[str, Any]) -> dict[str, JsonValue]:
-    from xb_muscle_ros.prove.generator.composite import make_composite
-    from xb_muscle_ros.prove.generator.composite_mix import composite_specs
-    from xb_muscle_ros.prove.generator.writing import composite_entry, write_case
-
-    number, folder = int(task["number"]), Path(task["out"])
-    spec = composite_specs(int(task["cases"]), int(task["seed"]))[number - 1]
-    case = make_composite(spec, int(task["seed"]), number)
-    write_case(folder, case, f"fibre_{number:04d}", str(task["method"]))
-    return composite_entry(case, folder.name)
-
-
-_MAKERS: Mapping[str, Callable[[Mapping[str, Any]], dict[str, JsonValue]]] = {SINGLES: _single, COMPOSITES: _composite}

@@ -13,6 +13,7 @@ from typing import Any
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import matching, refuse_older, write_text
+from xb_muscle_ros.prove.answers import row_of
 from xb_muscle_ros.prove.sealing import BENCHMARK, load_benchmark
 from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.work import JsonValue, Options, stream
@@ -76,7 +77,6 @@ def _task(folder: Path, out: Path, name: str, quick: bool, seed: int) -> dict[st
 
 def _diagnose(task: Mapping[str, Any]) -> dict[str, JsonValue]:
     """Diagnose one case; a case that the tool cannot do is a result as well."""
-    from xb_muscle_ros.diagnose.report.output import as_row
     from xb_muscle_ros.diagnose.run import diagnose_bags
     from xb_muscle_ros.trials.bags import find_bags
 
@@ -93,32 +93,4 @@ def _diagnose(task: Mapping[str, Any]) -> dict[str, JsonValue]:
         )
     except UserError as error:
         return {"error": str(error), "seconds": time.perf_counter() - start}
-    return {**needed(as_row(found)), "seconds": time.perf_counter() - start}
-
-
-def needed(diagnosis: Mapping[str, Any]) -> dict[str, JsonValue]:
-    """What the scoring needs of a ``diagnosis.json``."""
-    mismatch = diagnosis.get("mismatch") or []
-    before, after = (diagnosis.get(when) or {} for when in ("before", "after"))
-    return {
-        "verdict": diagnosis["verdict"],
-        "answer": list(diagnosis.get("answer") or ()),
-        "family": diagnosis.get("family"),
-        "p_value": diagnosis.get("p_value"),
-        "confidence": diagnosis.get("confidence"),
-        **_components(diagnosis),
-        "first_mismatch": {key: mismatch[0][key] for key in ("trial", "phase", "size_f0")} if mismatch else None,
-        "before_heldout_f0": before.get("heldout_rmsd_f0"),
-        "after_heldout_f0": after.get("heldout_rmsd_f0"),
-    }
-
-
-_OF_COMPONENT = ("name", "kind", "family", "members", "inclusion_probability", "log_odds", "contribution_f0")
-
-
-def _components(diagnosis: Mapping[str, Any]) -> dict[str, JsonValue]:
-    """What the scoring needs of the components; nothing in format 1, which has none."""
-    rows = diagnosis.get("components")
-    return (
-        {} if rows is None else {"components": [{key: row[key] for key in _OF_COMPONENT if key in row} for row in rows]}
-    )
+    return {**row_of(found), "seconds": time.perf_counter() - start}

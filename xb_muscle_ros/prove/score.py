@@ -7,12 +7,23 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import matching, refuse_older, write_text
-from xb_muscle_ros.prove.counting import Score
+from xb_muscle_ros.prove import calibration
+from xb_muscle_ros.prove.answers import Answer
+from xb_muscle_ros.prove.calibration import Stated, as_stated, reliability
+from xb_muscle_ros.prove.counting import Score, by_size, of_composites, of_singles
+from xb_muscle_ros.prove.judging import Judged, JudgedEffect, JudgedName, JudgedSingle, judge, judge_composite
 from xb_muscle_ros.prove.run import RESULTS
+from xb_muscle_ros.prove.score_figures import draw_composites, draw_singles
 from xb_muscle_ros.prove.sealing import COMPOSITES, SINGLES, kind_of, load_benchmark, open_key
 from xb_muscle_ros.trials.bag_files import remove_results
+
+# Confidence in a first name is binned in fifths.
+_CONFIDENCE_BINS = 5
 
 
 def score(results: Path, key: Path, out: Path, overwrite: bool = False) -> tuple[str, list[Path]]:
@@ -35,7 +46,8 @@ def score(results: Path, key: Path, out: Path, overwrite: bool = False) -> tuple
     truths = open_key(key, benchmark)["cases"]
     path = results / RESULTS
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))["cases"]
+        cases = json.loads(path.read_text(encoding="utf-8"))["cases"]
+        found = {name: Answer.read(row) for name, row in cases.items()}
     except (OSError, ValueError, KeyError) as error:
         raise UserError(f"{path} cannot be read; give the folder that 'prove run' wrote") from error
     missing = [truth["case"] for truth in truths if truth["case"] not in found]
@@ -50,19 +62,19 @@ def _older(out: Path) -> list[Path]:
 
 
 _SINGLE_SIZE = """
-A size is the RMS over all samples of what is left after the base model was refitted, by class: the highest of 0.5, 1, 2
+A size is the RMS over all samples of the residual after the base model was refitted, by class: the highest of 0.5, 1, 2
 and 4 % F0 of which it reaches 85 %. Intervals of shares: Clopper–Pearson.
 """
 _COMPOSITE_SIZE = """
-A size is the RMS over all samples of what a mechanism leaves if the model has everything else that is there, and
-constants, the others' scales and ordinary errors of the measurement are fitted again; classes by their least size.
-A component of several members counts once, by its family, and is never right by name. Intervals: Clopper–Pearson; of
-calibration errors: bootstrap over cases.
+A size is the unique contribution of a mechanism: the RMS over all samples of the residual if the model has everything
+else that is there, and constants, the others' scales and ordinary measurement artefacts are fitted again; classes by
+their least size. A component of several members counts once, by its family, and is never right by name. Intervals:
+Clopper–Pearson; of calibration errors: bootstrap over cases.
 """
 
 
 class Summary(NamedTuple):
-    """What is told of a benchmark.
+    """What is reported of a benchmark.
 
     Attributes:
         scores: those with a bar first.
@@ -77,36 +89,53 @@ class Summary(NamedTuple):
     draw: Callable[[Path], list[Path]]
 
 
-def _of_singles(truths: Sequence[Mapping[str, Any]], found: Mapping[str, Any]) -> Summary:
-    from xb_muscle_ros.prove.counting import by_size, calibration, scores
-    from xb_muscle_ros.prove.judging import judge
-    from xb_muscle_ros.prove.score_figures import draw
-
+def _of_singles(truths: Sequence[Mapping[str, Any]], found: Mapping[str, Answer]) -> Summary:
     judged = [judge(truth, found[truth["case"]]) for truth in truths]
-    sizes = by_size(judged)
-    tree = {"by_size": sizes, "calibration": calibration(judged), "judged": [j._asdict() for j in judged]}
-    heads = ("family first", "mechanism first", "verdict physics")
-    section = _sizes("Single effects", sizes, "size_class_f0", heads, ("family", "exact", "physics"))
-    return Summary(scores(judged), tree, section + _SINGLE_SIZE, lambda folder: draw(folder, judged, tree))
+    singles = [j for j in judged if j.kind == "single" and j.size_class_f0 is not None]
+    hits: dict[str, Callable[[JudgedSingle], bool]] = {
+        "family": lambda j: j.family, "exact": lambda j: j.exact, "physics": lambda j: j.says(Verdict.PHYSICS)
+    }  # fmt: skip
+    sizes = by_size(singles, lambda j: j.size_class_f0 or 0.0, hits)
+    stated = [Stated(j.confidence, j.exact) for j in judged if j.confidence is not None and j.answer != j.verdict]
+    bins = reliability([stated], _CONFIDENCE_BINS)
+    brier = float(np.mean([(s.probability - s.right) ** 2 for s in stated])) if stated else None
+    tree = {"by_size": sizes, "calibration": {"n": len(stated), "brier": brier, "bins": bins}, "judged": _rows(judged)}
+    heads = {"family": "family first", "exact": "mechanism first", "physics": "verdict physics"}
+    section = _sizes("Single effects", sizes, heads) + _SINGLE_SIZE
+    return Summary(of_singles(judged), tree, section, lambda folder: draw_singles(folder, judged, sizes, bins))
 
 
-def _of_composites(truths: Sequence[Mapping[str, Any]], found: Mapping[str, Any]) -> Summary:
-    from xb_muscle_ros.prove.calibration import reliability
-    from xb_muscle_ros.prove.composite_counting import as_stated, by_size, scores
-    from xb_muscle_ros.prove.composite_figures import draw
-    from xb_muscle_ros.prove.composite_judging import judge_composite
-
+def _of_composites(truths: Sequence[Mapping[str, Any]], found: Mapping[str, Answer]) -> Summary:
     judged = [judge_composite(truth, found[truth["case"]]) for truth in truths]
-    sizes, bins, counted = by_size(judged), reliability([as_stated(j.statements) for j in judged]), scores(judged)
-    tree = {"by_size": sizes, "calibration": bins, "judged": [j.as_json() for j in judged]}
-    section = _sizes("Effects", sizes, "from_f0", ("family in the answer", "name in the answer"), ("family", "exact"))
-    error = next(s for s in counted if s.name == "calibration")
+    hits: dict[str, Callable[[JudgedEffect], bool]] = {
+        "family": lambda e: e.family_found, "exact": lambda e: e.exact_found
+    }  # fmt: skip
+    sizes = by_size([effect for j in judged for effect in j.effects], lambda e: e.size_f0, hits)
+    bins, errors = reliability(as_stated(j.statements) for j in judged), calibration.of_composites(judged)
+    error = errors[0]
+    words = (
+        f"expected calibration error {error.value:.3f}\n95 % interval {error.lower:.3f} to {error.upper:.3f}"
+        if error.value is not None
+        else ""
+    )
+    tree = {"by_size": sizes, "calibration": bins, "judged": _rows(judged)}
+    section = _sizes("Effects", sizes, {"family": "family in the answer", "exact": "name in the answer"})
     return Summary(
-        counted, tree, section + _COMPOSITE_SIZE, lambda folder: draw(folder, judged, sizes, bins, error)
+        of_composites(judged, errors), tree, section + _COMPOSITE_SIZE,
+        lambda folder: draw_composites(folder, judged, sizes, bins, words),
     )  # fmt: skip
 
 
-_SUMMARIES: Mapping[str, Callable[[Sequence[Mapping[str, Any]], Mapping[str, Any]], Summary]] = {
+def _rows(judged: Sequence[Judged]) -> list[dict[str, Any]]:
+    """As JSON can hold them."""
+    return [{k: [_plain(v) for v in of] if isinstance(of, tuple) else of for k, of in vars(j).items()} for j in judged]
+
+
+def _plain(row: Any) -> Any:
+    return row._asdict() if isinstance(row, (JudgedEffect, JudgedName)) else row
+
+
+_SUMMARIES: Mapping[str, Callable[[Sequence[Mapping[str, Any]], Mapping[str, Answer]], Summary]] = {
     SINGLES: _of_singles,
     COMPOSITES: _of_composites,
 }
@@ -132,43 +161,28 @@ def table(found: Sequence[Score]) -> str:
     """Scores as Markdown."""
     rows = ["| score | value | 95 % interval | cases | bar | reached |", "|---|---|---|---|---|---|"]
     for s in found:
-        told = {True: "yes", False: "no", None: ""}[s.reached]
+        reached = {True: "yes", False: "no", None: ""}[s.reached]
         bar = "" if s.bar is None else f"{'≤' if s.at_most else '≥'} {_number(s, s.bar)}"
         between = "" if s.lower is None or s.upper is None else f"{_number(s, s.lower)} to {_number(s, s.upper)}"
-        rows.append(f"| {s.meaning} | {_number(s, s.value)} | {between} | {s.n} | {bar} | {told} |")
+        rows.append(f"| {s.meaning} | {_number(s, s.value)} | {between} | {s.n} | {bar} | {reached} |")
     return "\n".join(rows)
-
-
-# Scores that are no share of cases, with their decimals.
-_DECIMALS = {
-    "gain": 2,
-    "calibration": 3,
-    "calibration_families": 3,
-    "calibration_components": 3,
-    "calibration_exact": 3,
-    "calibration_artefacts": 3,
-}
 
 
 def _number(s: Score, value: float | None) -> str:
     if value is None:
         return "–"
-    if s.name in _DECIMALS:
-        return f"{value:.{_DECIMALS[s.name]}f}"
-    return f"{100.0 * value:.0f} %"
+    # All but these are shares of cases.
+    decimals = 2 if s.name == "gain" else 3 if s.name.startswith("calibration") else None
+    return f"{100.0 * value:.0f} %" if decimals is None else f"{value:.{decimals}f}"
 
 
-def _sizes(what: str, rows: Sequence[Mapping[str, Any]], size: str, heads: Sequence[str], names: Sequence[str]) -> str:
-    """Shares by class of size as Markdown."""
-    out = [
-        f"## {what} by size",
-        "",
-        "| size after a refit | cases | " + " | ".join(heads) + " |",
-        "|---|---" + "|---" * len(heads) + "|",
-    ]
+def _sizes(what: str, rows: Sequence[Mapping[str, Any]], heads: Mapping[str, str]) -> str:
+    """Shares by class of size as Markdown; heads by name of the share."""
+    columns = ["size", "cases", *heads.values()]
+    out = [f"## {what} by size", "", f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
     for row in rows:
-        shares = (row[name]["value"] for name in names)
-        told = f"{100.0 * row[size]:g} % F0" if row[size] else "below 0.5 % F0"
-        cells = " | ".join("–" if value is None else f"{100.0 * value:.0f} %" for value in shares)
-        out.append(f"| {told} | {row['n']} | {cells} |")
+        size = f"{100.0 * row['from_f0']:g} % F0" if row["from_f0"] else "below 0.5 % F0"
+        values = (row[name]["value"] for name in heads)
+        cells = ("–" if value is None else f"{100.0 * value:.0f} %" for value in values)
+        out.append(f"| {' | '.join([size, str(row['n']), *cells])} |")
     return "\n".join([*out, ""])

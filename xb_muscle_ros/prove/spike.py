@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,18 +11,16 @@ import numpy as np
 import yaml
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import refuse_older, write_text
-from xb_muscle_ros.prove.generator.case import Concealed, cells, conceal, size_class, trial_name
-from xb_muscle_ros.prove.generator.effects import EFFECTS
-from xb_muscle_ros.prove.generator.mix import Spec, spike_specs
-from xb_muscle_ros.prove.generator.nuisances import left_beside_nuisances
-from xb_muscle_ros.prove.generator.recording import Faults
+from xb_muscle_ros.files import write_text
+from xb_muscle_ros.prove.generator.artefacts import Artefacts
+from xb_muscle_ros.prove.generator.case import trial_name, usual
+from xb_muscle_ros.prove.generator.mix import Spec, spikes
+from xb_muscle_ros.prove.generator.nuisances import residual_beside_nuisances
 from xb_muscle_ros.prove.generator.refit import Refit
+from xb_muscle_ros.prove.generator.single import conceal, facts
 from xb_muscle_ros.prove.generator.study import Planned
 from xb_muscle_ros.prove.generator.world import MODELS, SAMPLE_S, World
-from xb_muscle_ros.prove.make import case_name, seal
-from xb_muscle_ros.prove.sealing import BENCHMARK, older_cases
-from xb_muscle_ros.trials.bag_files import remove_results
+from xb_muscle_ros.prove.make import case_name, make_room, seal
 from xb_muscle_ros.trials.bags import find_bags, read_trial, write_trial
 from xb_muscle_ros.trials.trial import Trial
 from xb_muscle_ros.work import JsonValue, Options, stream
@@ -62,13 +59,10 @@ def spike(
     Raises:
         UserError: a bag or the file cannot be used, the folder holds a benchmark, or the key lies in it.
     """
-    if out.resolve() in key.resolve().parents:
-        raise UserError(f"key {key} lies within {out}, where the tool would find it; choose a file elsewhere")
-    refuse_older([path for path in (out / BENCHMARK, key) if path.exists()], overwrite)
-    remove_results(older_cases(out))
+    make_room(out, key, overwrite)
     world = _world(fiber)
     paths = [str(path) for path in find_bags(bags)]
-    specs = spike_specs(cases, seed, world.model)
+    specs = spikes(cases, seed, world.model)
     tasks = [
         {
             "bags": paths, "fiber": str(fiber), "seed": seed, "number": i + 1, "spec": list(spec),
@@ -81,15 +75,14 @@ def spike(
 
 
 def _spike_one(task: Mapping[str, Any]) -> dict[str, JsonValue]:
-    kind, labels, size, model = task["spec"]
-    spec, fiber, folder = Spec(kind, tuple(labels), size, model), Path(task["fiber"]), Path(task["out"])
+    kind, labels, sizes, model, *_ = task["spec"]
+    spec, fiber, folder = Spec(kind, tuple(labels), tuple(sizes), model), Path(task["fiber"]), Path(task["out"])
     trials = [read_trial(Path(path)) for path in task["bags"]]
     study, base = [_planned(trial) for trial in trials], _world(fiber)
     random = np.random.default_rng([int(task["seed"]), int(task["number"])])
     refit = Refit(base, [planned.stimulus() for planned in study])
-    start = [Concealed(label, EFFECTS[label].start, EFFECTS[label].draw(random)) for label in spec.labels]
-    concealed, forces, refitted = conceal(spec, start, base, study, Faults(), refit)
-    beside = left_beside_nuisances(base, study, refit, refitted)
+    concealed, forces, refitted = conceal(spec, usual(spec, random), base, study, Artefacts(), refit)
+    beside = residual_beside_nuisances(base, study, refit, refitted)
     for i, (trial, force, plain) in enumerate(zip(trials, forces, refit.plain(), strict=True)):
         added = force - plain if concealed else np.zeros(force.size)
         _write(folder / "bags" / trial_name(i), trial_name(i), trial, added)
@@ -99,13 +92,8 @@ def _spike_one(task: Mapping[str, Any]) -> dict[str, JsonValue]:
         "kind": spec.kind if concealed else "untouched",
         "labels": list(spec.labels),
         "model": spec.model,
-        "asked_size_f0": spec.size,
-        "size_f0": refitted.rms,
-        "size_class_f0": size_class(refitted.rms) if concealed else None,
-        "beside_nuisances_f0": math.sqrt(np.mean(np.concatenate(beside) ** 2)),
-        "concealed": [{"label": c.label, "scale": c.scale, "shape": c.shape} for c in concealed],
         "noise_rms_f0": None,
-        "cells": cells(study, refitted.left, beside),
+        **facts(spec, study, concealed, refitted, beside),
     }
 
 

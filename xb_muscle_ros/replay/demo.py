@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import importlib.util
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,14 +26,17 @@ _PCAS = (4.5, 6.1, 6.3, 6.6, 9.0)
 AUGMENTED = Path("augmented") / "GMe1.yaml"
 _REALTIME_S, _RATE_HZ = 5.0, 1000.0
 
+Timing = Callable[..., Mapping[str, float]]
 
-def demo(recordings: Path | None, out: Path, live: bool) -> int:
+
+def demo(recordings: Path | None, out: Path, live: bool, timing: Timing) -> int:
     """Run the demo from the top of the source tree; returns the exit code, 1 where node and replay differ.
 
     Args:
         recordings: folder with the recordings of the rat soleus; looked for beside the source tree where None.
         out: folder for bags, results and figure.
         live: also through a muscle_node, over DDS.
+        timing: measures a realtime node: `bench.timing.run_timing`.
 
     Raises:
         UserError: see `replay`.
@@ -52,8 +56,8 @@ def demo(recordings: Path | None, out: Path, live: bool) -> int:
     if live and importlib.util.find_spec("rclpy") is None:
         print("\nROS 2 is not installed here (rclpy): the part through muscle_node is left out")
     elif live:
-        from xb_muscle_ros.node.player import play_live
-        from xb_muscle_ros.node.process import NodeProcess, private_domain
+        from xb_muscle_ros.node.client.player import play_live
+        from xb_muscle_ros.node.client.process import NodeProcess, private_domain
 
         domain = private_domain()
         with NodeProcess(domain, {"fiber_file": find_fibre_file(FIBRE), "mode": "lockstep"}):
@@ -65,23 +69,21 @@ def demo(recordings: Path | None, out: Path, live: bool) -> int:
             for a, b in zip(offline.simulated, through_node.simulated, strict=True)
         )
         print(f"\nforce through the node equals offline replay {'bit for bit' if agrees else 'NOT BIT FOR BIT'}")
-        _augmented_in_realtime()
+        _augmented_in_realtime(timing)
     print("\nresults:")
     for path in write_results(out, trials, offline, through_node):
         print(f"  {path.resolve()}")
     return 0 if agrees else 1
 
 
-def _augmented_in_realtime() -> None:
+def _augmented_in_realtime(timing: Timing) -> None:
     """A diagnosed model in a realtime node, and how punctual that is."""
-    from xb_muscle_ros.node.timing import run_timing
-
     path = next((f / AUGMENTED for f in fibre_folders() if (f / AUGMENTED).is_file()), None)
     if path is None:
         return
     fibre = load_fibre(path)
     # The measurement moves a fibre of 1 m; forces in F0 do not depend on it.
-    found = run_timing(_REALTIME_S, _RATE_HZ, str(path), settings={"constants.reference_length_m": 1.0})
+    found = timing(_REALTIME_S, _RATE_HZ, str(path), settings={"constants.reference_length_m": 1.0})
     core = 100.0 * found["cpu_share"]
     late = f"late by {found['lateness_p50_us']:.0f} µs (median), {found['lateness_p99_us']:.0f} µs (99 %)"
     print(
@@ -93,10 +95,9 @@ def _augmented_in_realtime() -> None:
 
 def _import(files: list[Path], folder: Path) -> list[Path]:
     mapping = build_mapping(load_mapping(_MAPPING), f"mapping {_MAPPING}")
-    bags = []
-    for file in files:
-        bags.append(folder / file.stem)
-        write_trial(bags[-1], read_csv(file, mapping))
+    bags = [folder / file.stem for file in files]
+    for bag, file in zip(bags, files, strict=True):
+        write_trial(bag, read_csv(file, mapping))
     return bags
 
 

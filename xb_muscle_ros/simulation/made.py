@@ -51,7 +51,7 @@ def made(
         random: of the noise.
         noise_sd_f0: standard deviation of the noise, F0.
         substeps: steps of the fibre between two samples.
-        faults: values by name of `measurement.faults.FAULTS`.
+        faults: values by name of `measurement.artefacts.ARTEFACTS`.
 
     Raises:
         UserError, StateViolation: see `simulate_trial`.

@@ -9,8 +9,8 @@ import numpy as np
 from xb_muscle_ros.errors import UserError, naming
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.registry import PUSHES_F0, slack_of
-from xb_muscle_ros.trials.ros_types import to_ns
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
+from xb_muscle_ros.trials.stamps import to_ns
 from xb_muscle_ros.trials.trial import Array, Trial
 
 

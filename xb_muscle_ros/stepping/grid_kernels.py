@@ -186,7 +186,7 @@ def torn_sum(tearing: Array, k: Array, bins: int) -> float:
 
 
 def attempt(s: Array, h: float, velocity: float, calcium: float, p: Array, out: Array, work: Array) -> float:
-    """One step of ROS2 of h seconds; returns the largest embedded error.
+    """One step of `rosenbrock2` of h seconds; returns the largest embedded error.
 
     The matrix in place of the Jacobian has the bins' detachment rates and the other states' own decay on its diagonal,
     and below it how the other states and the velocity follow the bins: without that, the flux of heads that are about

@@ -68,14 +68,13 @@ class CalciumTransient:
         """
         calcium = np.full(np.shape(time_s), self.rest_um)
         level = self.rest_um
-        for i, (on_s, off_s) in enumerate(stimulated):
-            next_on_s = stimulated[i + 1][0] if i + 1 < len(stimulated) else np.inf
-            rising = (time_s >= on_s) & (time_s < off_s)
-            falling = (time_s >= off_s) & (time_s < next_on_s)
-            calcium[rising] = self._towards(self.tetanus_um, level, time_s[rising] - on_s, self.rise_s)
-            level = float(self._towards(self.tetanus_um, level, np.array(off_s - on_s), self.rise_s))
-            calcium[falling] = self._towards(self.rest_um, level, time_s[falling] - off_s, self.decay_s)
-            level = float(self._towards(self.rest_um, level, np.array(next_on_s - off_s), self.decay_s))
+        next_on_s = [on_s for on_s, _ in stimulated[1:]] + [np.inf]
+        for (on_s, off_s), again_s in zip(stimulated, next_on_s, strict=False):
+            rising = (self.tetanus_um, self.rise_s, on_s, off_s)
+            for goal, constant_s, begin_s, end_s in (rising, (self.rest_um, self.decay_s, off_s, again_s)):
+                inside = (time_s >= begin_s) & (time_s < end_s)
+                calcium[inside] = self._towards(goal, level, time_s[inside] - begin_s, constant_s)
+                level = float(self._towards(goal, level, np.array(end_s - begin_s), constant_s))
         return calcium
 
     def samples(self, time_s: Array, stimulated: Sequence[Interval]) -> tuple[Array, Array]:

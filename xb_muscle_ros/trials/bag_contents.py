@@ -1,18 +1,25 @@
-"""A bag opened: the messages of its files, its ``custom_data``, and what was wrong with it."""
+"""A bag opened: the messages of its files, decoded on demand, its ``custom_data``, and what was wrong with it."""
 
 from __future__ import annotations
 
-from collections.abc import Container
-from dataclasses import dataclass
+import struct
+from collections.abc import Container, Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
+from rosbags.interfaces.typing import Typesdict
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials import fast_yaml
+from xb_muscle_ros.trials import fast_yaml, ros_types
 from xb_muscle_ros.trials.bag_files import METADATA, mcap_files
 from xb_muscle_ros.trials.mcap_records import Message, Recording, read_recording
+
+_IDL_BEGIN = "=" * 80 + "\n"
 
 
 @dataclass(frozen=True)
@@ -64,16 +71,14 @@ def open_bag(path: Path, topics: Container[str] | None = None) -> BagContents:
     information, flaws = _information(path)
     files, missing = _files(path, information)
     flaws += missing
-    types: dict[str, str] = {}
-    encodings: dict[str, str] = {}
-    definitions: dict[str, tuple[str, str]] = {}
+    bag = BagContents(path, {}, {}, {}, {}, {}, None, ())
     filed: dict[str, list[Message]] = {}
     copies: list[tuple[str, dict[str, Any]]] = []
     for file in files:
         recording = _recording(path, file, topics)
-        types.update(recording.types)
-        encodings.update(recording.encodings)
-        definitions.update(recording.definitions)
+        bag.types.update(recording.types)
+        bag.encodings.update(recording.encodings)
+        bag.definitions.update(recording.definitions)
         for message in recording.messages:
             filed.setdefault(message.topic, []).append(message)
         if recording.damage:
@@ -87,7 +92,7 @@ def open_bag(path: Path, topics: Container[str] | None = None) -> BagContents:
     custom_data, note = _custom_data(information, copies)
     messages = {topic: sorted(each, key=lambda message: message.log_time_ns) for topic, each in filed.items()}
     as_filed = {topic: each for topic, each in filed.items() if each != messages[topic]}
-    return BagContents(path, types, encodings, definitions, messages, as_filed, custom_data, (*flaws, *note))
+    return replace(bag, messages=messages, as_filed=as_filed, custom_data=custom_data, flaws=(*flaws, *note))
 
 
 def _recording(bag: Path, file: Path, topics: Container[str] | None) -> Recording:
@@ -175,3 +180,63 @@ def _custom_data(
 def _strings(information: dict[str, Any] | None) -> dict[str, str]:
     data = None if information is None else information.get("custom_data")
     return {str(key): str(value) for key, value in data.items()} if isinstance(data, dict) else {}
+
+
+class AnyMessage(NamedTuple):
+    """A message of any type: its topic, when it was logged (ns), and what it holds."""
+
+    topic: str
+    log_time_ns: int
+    message: Any
+
+
+def decoded(bag: BagContents, topic: str, messages: Iterable[Message], store: Typestore) -> Iterator[AnyMessage]:
+    """Messages of a topic, by the types of a store.
+
+    Raises:
+        UserError: the store does not have the type, or a message is not of it.
+    """
+    kind = bag.types[topic]
+    if bag.encodings[topic] != "cdr" or kind not in store.fielddefs:
+        raise UserError(
+            f"bag {bag.path}: {topic} is {kind or 'of no known type'} ({bag.encodings[topic]}), which the bag does "
+            "not describe; record or convert it again"
+        )
+    for i, each in enumerate(messages):
+        try:
+            yield AnyMessage(topic, each.log_time_ns, store.deserialize_cdr(each.data, kind))
+        except (SerdeError, struct.error, ValueError, IndexError) as problem:
+            raise UserError(f"bag {bag.path}: {topic}, message {i} cannot be decoded: {problem}") from problem
+
+
+def all_decoded(bag: BagContents) -> Iterator[AnyMessage]:
+    """All messages of a bag, topic by topic in the order of log time.
+
+    Types are those that the bag describes, and the standard ones of ROS 2 Jazzy.
+
+    Raises:
+        UserError: see `decoded`.
+    """
+    store = _typestore(bag)
+    for topic, messages in bag.messages.items():
+        yield from decoded(bag, topic, messages, store)
+
+
+def _typestore(bag: BagContents) -> Typestore:
+    described: Typesdict = {}
+    for kind in {bag.types[topic] for topic in bag.messages}:
+        if kind not in bag.definitions:
+            continue
+        encoding, text = bag.definitions[kind]
+        try:
+            if encoding == "ros2msg":
+                described.update(get_types_from_msg(text, kind))
+            elif encoding == "ros2idl":
+                for part in text.split(_IDL_BEGIN):
+                    body = part.partition("\n")[2] if part.startswith("IDL: ") else part
+                    described.update(get_types_from_idl(body) if body.strip() else {})
+        except TypesysError as problem:
+            raise UserError(f"bag {bag.path}: the description of {kind} cannot be read: {problem}") from problem
+    store = get_typestore(Stores.EMPTY)
+    store.register({**ros_types.typestore().fielddefs, **described})
+    return store

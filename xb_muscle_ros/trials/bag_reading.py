@@ -164,7 +164,7 @@ def read_simulated(path: Path) -> Simulated | None:
         return None
     fibre = topics.names(ros_types.FORCE)[0]
     force = topics.samples(ros_types.FORCE, ("effort", "position", "velocity"), fibre)
-    moments = topics.rows(ros_types.MOMENTS, lambda message, i: _moments(message, f"bag {path}", i))
+    moments = topics.rows(ros_types.MOMENTS, _moments)
     time_s, at_force, at_moments = np.intersect1d(force.time_s, moments.time_s, return_indices=True)
     if time_s.size == 0:
         raise UserError(f"bag {path}: {ros_types.FORCE} and {ros_types.MOMENTS} have no stamp in common")
@@ -178,11 +178,11 @@ def read_simulated(path: Path) -> Simulated | None:
     )
 
 
-def _moments(message: JointState, where: str, i: int) -> list[float]:
+def _moments(message: JointState) -> list[float]:
     held = {name.rpartition("/")[2]: value for name, value in zip(message.name, message.position, strict=False)}
     missing = [name for name in MOMENTS if name not in held]
     if missing:
-        raise UserError(f"{where}: {ros_types.MOMENTS}, message {i} has no {missing[0]}; needed: {', '.join(MOMENTS)}")
+        raise ValueError(f"has no {missing[0]}; needed: {', '.join(MOMENTS)}")
     return [float(held[name]) for name in MOMENTS]
 
 

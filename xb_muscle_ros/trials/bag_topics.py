@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
-from rosbags.serde import SerdeError
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
-from xb_muscle_ros.trials.bag_contents import BagContents
-from xb_muscle_ros.trials.mcap_records import Message
+from xb_muscle_ros.trials.bag_contents import BagContents, decoded
 from xb_muscle_ros.trials.ros_types import JointState
+from xb_muscle_ros.trials.stamps import Stamps, not_after, to_s
 from xb_muscle_ros.trials.trial import Array
-
-Stamps = npt.NDArray[np.int64]
 
 
 class Samples(NamedTuple):
@@ -38,13 +33,6 @@ class Samples(NamedTuple):
     skipped: str = ""
 
 
-class Decoded(NamedTuple):
-    """Messages of a topic in the order of log time, decoded, and their header stamps in ns (in any order)."""
-
-    stamps: Stamps
-    messages: list[JointState]
-
-
 class Topics:
     """The JointState topics of a bag, each decoded once.
 
@@ -54,8 +42,7 @@ class Topics:
 
     def __init__(self, bag: BagContents) -> None:
         self.bag = bag
-        self._decoded: dict[str, Decoded] = {}
-        self._as_filed: dict[str, Decoded] = {}
+        self._decoded: dict[tuple[str, bool], list[JointState]] = {}
 
     def __contains__(self, topic: str) -> bool:
         """Whether the topic has any message."""
@@ -68,7 +55,7 @@ class Topics:
             UserError: no message, not JointState, or a message without a name.
         """
         seen: dict[str, None] = {}
-        for i, message in enumerate(self.decoded(topic).messages):
+        for i, message in enumerate(self._messages(topic)):
             if not message.name:
                 raise UserError(
                     f"bag {self.bag.path}: {topic}, message {i} has an empty name; needed is the fibre in name[0]"
@@ -83,76 +70,57 @@ class Topics:
             UserError: see `names`; stamps that do not increase, values that are missing or not finite.
         """
 
-        def row(message: JointState, i: int, stamps: Stamps) -> list[float] | None:
-            if name not in message.name:
-                return None
-            at = list(message.name).index(name)
-            return [self._value(topic, message, field, at, i, stamps) for field in fields]
+        def row(message: JointState) -> list[float] | None:
+            names = list(message.name)
+            return [_value(message, field, names.index(name)) for field in fields] if name in names else None
 
-        return self._rows(topic, row, name)
+        return self.rows(topic, row, name)
 
-    def rows(self, topic: str, values: Callable[[JointState, int], list[float]]) -> Samples:
-        """Stamps and what a function makes of each message and its number.
+    def rows(self, topic: str, row: Callable[[JointState], list[float] | None], name: str = "") -> Samples:
+        """Stamps and what a function makes of each message; it skips one by None, and refuses one by a ValueError.
 
         Raises:
             UserError: as `samples`.
         """
-        return self._rows(topic, lambda message, i, _: values(message, i), "")
-
-    def decoded(self, topic: str) -> Decoded:
-        """All messages of a topic in the order of log time.
-
-        Raises:
-            UserError: there is none, or it is no JointState.
-        """
-        if topic not in self._decoded:
-            self._check(topic)
-            self._decoded[topic] = self._decode(topic, self.bag.messages[topic])
-        return self._decoded[topic]
-
-    def _rows(self, topic: str, row: Callable[[JointState, int, Stamps], list[float] | None], name: str) -> Samples:
-        found = self._kept(self.decoded(topic), row)
-        warnings = []
-        if _back(found.stamps) is not None and topic in self.bag.as_filed:
+        kept, warnings = self._kept(topic, row), []
+        if not_after(kept.stamps).size and topic in self.bag.as_filed:
             # A recorder's own clock may step back; then the file has the order.
-            if topic not in self._as_filed:
-                self._as_filed[topic] = self._decode(topic, self.bag.as_filed[topic])
-            filed = self._kept(self._as_filed[topic], row)
-            if _back(filed.stamps) is None:
-                found = filed
+            filed = self._kept(topic, row, as_filed=True)
+            if not not_after(filed.stamps).size:
+                kept = filed
                 warnings.append(
                     f"bag {self.bag.path}: {topic} is in the order of the file, because log times step back"
                 )
-        self._check_order(topic, found)
-        values = np.array(found.rows, dtype=np.float64)
-        bad = np.argwhere(~np.isfinite(values))
-        if bad.size:
-            i, j = (int(k) for k in bad[0])
-            where = self._at(topic, found.places[i], found.stamps[i])
+        for i in not_after(kept.stamps)[:1].tolist():
+            raise UserError(
+                f"{self._at(topic, kept.places[i], kept.stamps[i])} does not come after the one before, t = "
+                f"{kept.stamps[i - 1] / 1e9:.9f} s; header stamps have to increase"
+            )
+        values = np.array(kept.rows, dtype=np.float64)
+        for i, j in np.argwhere(~np.isfinite(values))[:1].tolist():
+            where = self._at(topic, kept.places[i], kept.stamps[i])
             raise UserError(f"{where} has the value {values[i, j]}; allowed are finite numbers")
-        total = len(found.rows) + found.others
-        skipped = f"{found.others} of {total} messages on {topic}" if found.others else ""
-        return Samples(ros_types.to_s(found.stamps), values, name, tuple(warnings), skipped)
+        total = len(self._messages(topic))
+        others = total - len(kept.rows)
+        skipped = f"{others} of {total} messages on {topic}" if others else ""
+        return Samples(to_s(kept.stamps), values, name, tuple(warnings), skipped)
 
-    def _kept(self, decoded: Decoded, row: Callable[[JointState, int, Stamps], list[float] | None]) -> _Kept:
-        rows, places = [], []
-        for i, message in enumerate(decoded.messages):
-            values = row(message, i, decoded.stamps)
+    def _kept(self, topic: str, row: Callable[[JointState], list[float] | None], as_filed: bool = False) -> _Kept:
+        rows, places, stamps = [], [], []
+        for i, message in enumerate(self._messages(topic, as_filed)):
+            stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+            try:
+                values = row(message)
+            except ValueError as problem:
+                raise UserError(f"{self._at(topic, i, stamp)} {problem}") from None
             if values is not None:
                 rows.append(values)
                 places.append(i)
-        return _Kept(decoded.stamps[places], rows, places, len(decoded.messages) - len(rows))
+                stamps.append(stamp)
+        return _Kept(np.array(stamps, dtype=np.int64), rows, places)
 
-    def _value(self, topic: str, message: JointState, field: str, at: int, i: int, stamps: Stamps) -> float:
-        array = getattr(message, field)
-        if at < len(array):
-            return float(array[at])
-        where = self._at(topic, i, stamps[i])
-        if len(array) == 0:
-            raise UserError(f"{where} has an empty {field}; needed is one value for the fibre")
-        raise UserError(f"{where} has {len(array)} values of {field} for {len(message.name)} names; needed is one each")
-
-    def _check(self, topic: str) -> None:
+    def _messages(self, topic: str, as_filed: bool = False) -> list[JointState]:
+        """All messages of a topic in the order of log time, or in that of the files."""
         bag = self.bag
         if topic not in bag.messages:
             raise UserError(
@@ -164,40 +132,27 @@ class Topics:
                 f"bag {bag.path}: {topic} is {bag.types[topic] or 'of no known type'} ({bag.encodings[topic]}); "
                 f"allowed is {ros_types.JOINT_STATE} (cdr)"
             )
-
-    def _decode(self, topic: str, raw: list[Message]) -> Decoded:
-        messages = []
-        for i, each in enumerate(raw):
-            try:
-                message = ros_types.typestore().deserialize_cdr(each.data, ros_types.JOINT_STATE)
-            except (SerdeError, struct.error, ValueError, IndexError) as problem:
-                raise UserError(f"bag {self.bag.path}: {topic}, message {i} cannot be decoded: {problem}") from problem
-            assert isinstance(message, JointState)  # the type asked for
-            messages.append(message)
-        stamps = [message.header.stamp.sec * 10**9 + message.header.stamp.nanosec for message in messages]
-        return Decoded(np.array(stamps, dtype=np.int64), messages)
-
-    def _check_order(self, topic: str, found: _Kept) -> None:
-        i = _back(found.stamps)
-        if i is not None:
-            where = self._at(topic, found.places[i], found.stamps[i])
-            raise UserError(
-                f"{where} does not come after the one before, t = {found.stamps[i - 1] / 1e9:.9f} s; header stamps "
-                "have to increase"
-            )
+        if (topic, as_filed) not in self._decoded:
+            raw = (bag.as_filed if as_filed else bag.messages)[topic]
+            self._decoded[topic, as_filed] = [each.message for each in decoded(bag, topic, raw, ros_types.typestore())]
+        return self._decoded[topic, as_filed]
 
     def _at(self, topic: str, i: int, stamp: int) -> str:
         return f"bag {self.bag.path}: {topic}, message {i} at t = {stamp / 1e9:.9f} s"
 
 
 class _Kept(NamedTuple):
+    """Messages that are taken: their stamps, what was made of them, and which of the topic each is, from 0."""
+
     stamps: Stamps
     rows: list[list[float]]
     places: list[int]
-    others: int
 
 
-def _back(stamps: Stamps) -> int | None:
-    """Place of the first stamp that does not come after the one before."""
-    back = np.flatnonzero(np.diff(stamps) <= 0)
-    return int(back[0]) + 1 if back.size else None
+def _value(message: JointState, field: str, at: int) -> float:
+    array = getattr(message, field)
+    if at < len(array):
+        return float(array[at])
+    if len(array) == 0:
+        raise ValueError(f"has an empty {field}; needed is one value for the fibre")
+    raise ValueError(f"has {len(array)} values of {field} for {len(message.name)} names; needed is one each")

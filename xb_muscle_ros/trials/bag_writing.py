@@ -4,27 +4,40 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.rosbag2.enums import CompressionMode
+from rosbags.rosbag2.storage_mcap import McapWriter
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials import ros_types
+from xb_muscle_ros.trials import fast_yaml, ros_types
 from xb_muscle_ros.trials.bag_files import check_replaceable
-from xb_muscle_ros.trials.bag_writer import BagWriter
 from xb_muscle_ros.trials.custom_data import facts_to_custom_data
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
+from xb_muscle_ros.trials.stamps import not_after, to_ns
 from xb_muscle_ros.trials.trial import Array, Trial
+
+# Whose message definitions and type hashes the bags hold.
+ROS_DISTRO = "jazzy"
 
 
 class _Series(NamedTuple):
-    """Messages of one topic: stamps in ns and a function from sample index to the serialized message."""
+    """Messages of one topic: stamps in ns, names, and arrays of shape (messages, names) by their field."""
 
     topic: str
     stamps_ns: list[int]
-    message: Callable[[int], bytes]
+    names: list[str]
+    fields: dict[str, Array]
+
+    def message(self, i: int) -> bytes:
+        """One of them, serialized."""
+        values = {field: array[i] for field, array in self.fields.items()}
+        return ros_types.joint_state(self.stamps_ns[i], self.names, **values)
 
 
 def write_trial(
@@ -89,44 +102,25 @@ def _series(trial: Trial, simulated: Simulated | None, where: str) -> list[_Seri
     fibre = [trial.facts.fibre]
     if not trial.facts.fibre:
         raise UserError(f"bag {where}: the trial's fibre has no name; give it one")
-    inputs = [
-        (ros_types.CALCIUM, trial.calcium_time_s, trial.calcium_um),
-        (ros_types.LENGTH, trial.time_s, trial.length_m),
-        (ros_types.MEASURED_FORCE, trial.force_time_s, trial.force_n),
+
+    def series(topic: str, time_s: Array, names: list[str], **fields: Array) -> _Series:
+        columns = {field: values.reshape(len(values), -1) for field, values in fields.items()}
+        stamps = _stamps(time_s, tuple(column for values in columns.values() for column in values.T), topic, where)
+        return _Series(topic, stamps, names, columns)
+
+    found = [
+        series(ros_types.CALCIUM, trial.calcium_time_s, fibre, position=trial.calcium_um),
+        series(ros_types.LENGTH, trial.time_s, fibre, position=trial.length_m),
     ]
-    series = []
-    for topic, time_s, values in inputs:
-        if topic != ros_types.MEASURED_FORCE or (time_s.size and trial.force_is_measured):
-            series.append(
-                _Series(topic, _stamps(time_s, (values,), topic, where), _one_value(topic, time_s, values, fibre))
-            )
+    if trial.force_time_s.size and trial.force_is_measured:
+        found.append(series(ros_types.MEASURED_FORCE, trial.force_time_s, fibre, effort=trial.force_n))
     if simulated is not None:
-        series += _simulated_series(simulated, trial.facts.fibre, where)
-    return series
-
-
-def _one_value(topic: str, time_s: Array, values: Array, names: list[str]) -> Callable[[int], bytes]:
-    stamps = ros_types.to_ns(time_s)
-    if ros_types.VALUE_FIELD[topic] == "effort":
-        return lambda i: ros_types.joint_state(int(stamps[i]), names, effort=values[i : i + 1])
-    return lambda i: ros_types.joint_state(int(stamps[i]), names, position=values[i : i + 1])
-
-
-def _simulated_series(simulated: Simulated, fibre: str, where: str) -> list[_Series]:
-    moments = np.column_stack([simulated.moments[name] for name in MOMENTS])
-    columns = (simulated.force_n, simulated.ce_length_m, simulated.ce_velocity_m_per_s)
-    stamps = _stamps(simulated.time_s, columns, ros_types.FORCE, where)
-    _stamps(simulated.time_s, tuple(simulated.moments.values()), ros_types.MOMENTS, where)
-    moment_names = [f"{fibre}/{name}" for name in MOMENTS]
-
-    def force(i: int) -> bytes:
-        effort, position, velocity = (column[i : i + 1] for column in columns)
-        return ros_types.joint_state(stamps[i], [fibre], position, velocity, effort)
-
-    def moment(i: int) -> bytes:
-        return ros_types.joint_state(stamps[i], moment_names, position=moments[i])
-
-    return [_Series(ros_types.FORCE, stamps, force), _Series(ros_types.MOMENTS, stamps, moment)]
+        of_fibre = {"position": simulated.ce_length_m, "velocity": simulated.ce_velocity_m_per_s}
+        found.append(series(ros_types.FORCE, simulated.time_s, fibre, effort=simulated.force_n, **of_fibre))
+        moments = np.column_stack([simulated.moments[name] for name in MOMENTS])
+        names = [f"{fibre[0]}/{name}" for name in MOMENTS]
+        found.append(series(ros_types.MOMENTS, simulated.time_s, names, position=moments))
+    return found
 
 
 def _stamps(time_s: Array, columns: tuple[Array, ...], topic: str, where: str) -> list[int]:
@@ -144,12 +138,63 @@ def _stamps(time_s: Array, columns: tuple[Array, ...], topic: str, where: str) -
             f"bag {where}: {topic} runs from {time_s[0]:.9g} to {time_s[-1]:.9g} s; a message stamp goes from 0 to "
             f"{ros_types.LAST_STAMP_NS // 10**9} s; shift the times"
         )
-    stamps = ros_types.to_ns(time_s)
-    back = np.flatnonzero(np.diff(stamps) <= 0)
-    if back.size:
-        i = int(back[0]) + 1
+    stamps = to_ns(time_s)
+    for i in not_after(stamps)[:1].tolist():
         raise UserError(
             f"bag {where}: {topic}, sample {i} at {time_s[i]:.9f} s does not come after {time_s[i - 1]:.9f} s; "
             "stamps have to increase by at least 1 ns"
         )
     return [int(stamp) for stamp in stamps]
+
+
+class _Mcap(McapWriter):
+    def __init__(self, path: Path, compression: CompressionMode) -> None:
+        super().__init__(path, compression)
+        self._facts: dict[str, str] = {}
+
+    def begin(self, name: str, facts: dict[str, str]) -> None:
+        self.path = self.path.rename(self.path.parent / f"{name}_0.mcap")
+        self._facts = facts
+
+    def close(self, version: int, metadata: str) -> None:
+        super().close(version, _with_facts(metadata, self._facts))
+
+
+class BagWriter(Writer):
+    """Writes an MCAP bag of rosbag2's version 9 to a folder that does not exist yet.
+
+    The writer of `rosbags` with three things made to fit: the MCAP file's name, ``custom_data`` and ``ros_distro``.
+    rosbag2 numbers the files of a bag. And the YAML writer within `rosbags` wraps long lines in ways that add or lose
+    spaces, in the metadata file and in its copy within the MCAP file; here nothing is wrapped.
+
+    Args:
+        folder: the folder to make.
+        name: the bag's name, which may differ from that of the folder.
+        facts: the bag's ``custom_data``.
+    """
+
+    STORAGE_PLUGINS = MappingProxyType({StoragePlugin.MCAP: _Mcap})
+
+    def __init__(self, folder: Path, name: str, facts: Mapping[str, str]) -> None:
+        super().__init__(folder, version=9, storage_plugin=StoragePlugin.MCAP)
+        self._name = name
+        self._facts = dict(facts)
+
+    def open(self) -> None:
+        """Make the folder and open the file."""
+        super().open()
+        assert isinstance(self.storage, _Mcap)  # from STORAGE_PLUGINS
+        self.storage.begin(self._name, self._facts)
+
+    def close(self) -> None:
+        """Write the metadata and close the file."""
+        super().close()
+        text = self.metapath.read_text(encoding="utf-8")
+        self.metapath.write_text(_with_facts(text, self._facts), encoding="utf-8")
+
+
+def _with_facts(text: str, facts: dict[str, str]) -> str:
+    """The metadata with ``custom_data`` and ``ros_distro`` put in, every value on one line."""
+    tree: dict[str, Any] = fast_yaml.load(text)
+    tree.get("rosbag2_bagfile_information", tree).update(custom_data=facts, ros_distro=ROS_DISTRO)
+    return fast_yaml.dump(tree)

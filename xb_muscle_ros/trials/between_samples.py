@@ -117,55 +117,37 @@ def straight_lines(time_s: Array, length_l0: Array, tolerance: float) -> list[Li
     """
     lines: list[Line] = []
     times, lengths = time_s.tolist(), length_l0.tolist()
-    first, n = 0, len(times)
-    while first <= n - _FEWEST:
-        line = _Growing(first, times, lengths)
-        while line.last + 1 < n and line.takes_next(tolerance):
-            line.grow()
-        if line.count >= _FEWEST:
-            lines.append(line.line)
-            first = line.last + 1
-        else:
-            first += 1
+    first = 0
+    while first <= len(times) - _FEWEST:
+        line = _longest(first, times, lengths, tolerance)
+        is_line = line.last - first + 1 >= _FEWEST
+        first = line.last + 1 if is_line else first + 1
+        lines += [line] if is_line else []
     return lines
 
 
-class _Growing:
-    """A straight line through two samples and those that follow, by sums that one more sample adds to."""
-
-    def __init__(self, first: int, times: list[float], lengths: list[float]) -> None:
-        self._first, self._times, self._lengths = first, times, lengths
-        self.last, self.count = first - 1, 0
-        # Of times since the first sample and of lengths beside it; squares and products.
-        self._time = self._length = self._squares = self._products = 0.0
-        self.grow()
-        self.grow()
-
-    def grow(self) -> None:
-        """Take the next sample."""
-        self.last += 1
-        self.count += 1
-        since = self._times[self.last] - self._times[self._first]
-        beside = self._lengths[self.last] - self._lengths[self._first]
-        self._time += since
-        self._length += beside
-        self._squares += since * since
-        self._products += since * beside
-
-    @property
-    def line(self) -> Line:
-        """Least squares."""
-        mean_s, mean = self._time / self.count, self._length / self.count
-        slope = (self._products - self._time * mean) / (self._squares - self._time * mean_s)
-        level = self._lengths[self._first] + mean - slope * mean_s
-        return Line(self._first, self.last, self._times[self._first], level, slope)
-
-    def takes_next(self, tolerance: float) -> bool:
-        """Whether the next sample is on the line, given how well so many samples tell where the next one is."""
-        # Evenly sampled, the variance of a line's next value is 1 + (4 n + 2)/(n (n - 1)) times that of a sample.
-        n = self.count
-        off = self._lengths[self.last + 1] - self.line.at(self._times[self.last + 1])
-        return abs(off) <= tolerance * math.sqrt(1.0 + (4.0 * n + 2.0) / (n * (n - 1.0)))
+def _longest(first: int, times: list[float], lengths: list[float], tolerance: float) -> Line:
+    """The line of least squares from a sample on as far as samples keep to it, by sums that one more adds to."""
+    line = Line(first, first, times[first], lengths[first], 0.0)
+    # Of times since the first sample and of lengths beside it; squares and products.
+    time = length = squares = products = 0.0
+    for last in range(first, len(times)):
+        n = last - first
+        if n > 1:
+            # Evenly sampled, the variance of a line's next value is 1 + (4 n + 2)/(n (n - 1)) times that of a sample.
+            allowed = tolerance * math.sqrt(1.0 + (4.0 * n + 2.0) / (n * (n - 1.0)))
+            if abs(lengths[last] - line.at(times[last])) > allowed:
+                break
+        since, beside = times[last] - times[first], lengths[last] - lengths[first]
+        time += since
+        length += beside
+        squares += since * since
+        products += since * beside
+        if n:
+            mean_s, mean = time / (n + 1), length / (n + 1)
+            slope = (products - time * mean) / (squares - time * mean_s)
+            line = Line(first, last, times[first], lengths[first] + mean - slope * mean_s, slope)
+    return line
 
 
 def _corner(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -148,10 +149,7 @@ def _moves(length_m: Array) -> bool:
 
 def counted(notes: Iterable[tuple[str, ...]]) -> list[str]:
     """Lines of all trials of a run, each once with the number of trials it holds for."""
-    counts: dict[str, int] = {}
-    for of_trial in notes:
-        for line in of_trial:
-            counts[line] = counts.get(line, 0) + 1
+    counts = Counter(line for of_trial in notes for line in of_trial)
     return [f"{line} ({n} trial{'s' if n > 1 else ''})" for line, n in counts.items()]
 
 

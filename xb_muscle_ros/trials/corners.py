@@ -6,6 +6,7 @@ Lines fitted to the middles of the pieces are free of both, so a corner is taken
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -85,15 +86,14 @@ def straight_pieces(time_s: Array, length: Array, l0: float | None = None, servo
     runs = with_steps(runs, time_s, length, l0)
     lines = [_line(time_s, length, run, half_window) for run in runs]
     corners = [float(time_s[0])]
-    for left, right, after in zip(range(len(runs)), range(1, len(runs)), runs[1:], strict=False):
-        low = 0.5 * (time_s[runs[left].first] + time_s[runs[left].last])
-        high = 0.5 * (time_s[after.first] + time_s[after.last])
+    for (left, left_line), (right, right_line) in itertools.pairwise(zip(runs, lines, strict=True)):
+        low, high = (0.5 * (time_s[run.first] + time_s[run.last]) for run in (left, right))
         met = _meeting(
-            _facing_line(time_s, length, runs[left], lines[left], half_window, at_end=True),
-            _facing_line(time_s, length, after, lines[right], half_window, at_end=False),
+            _facing_line(length, left, left_line, half_window, at_end=True),
+            _facing_line(length, right, right_line, half_window, at_end=False),
         )
         # Lines that meet outside both pieces are no corner of theirs; the sample where the direction changed then is.
-        corners.append(met if met is not None and low <= met <= high else float(time_s[after.first]))
+        corners.append(met if met is not None and low <= met <= high else float(time_s[right.first]))
     corners.append(float(time_s[-1]))
     return [Piece(run.direction, corners[i], corners[i + 1], lines[i]) for i, run in enumerate(runs)]
 
@@ -198,7 +198,7 @@ def _line(time_s: Array, length: Array, run: Run, half_window: int) -> tuple[flo
 
 
 def _facing_line(
-    time_s: Array, length: Array, run: Run, line: tuple[float, float], half_window: int, *, at_end: bool
+    length: Array, run: Run, line: tuple[float, float], half_window: int, *, at_end: bool
 ) -> tuple[float, float]:
     """The run's line, or for an isometric run the level of the samples nearest the corner."""
     if run.direction != 0:

@@ -6,8 +6,11 @@ import json
 import math
 import unicodedata
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.readers.units import finite
 from xb_muscle_ros.trials.trial import Phase, TrialFacts
 
 _CONTROL = ("Cc", "Cs", "Zl", "Zp")
@@ -28,9 +31,7 @@ def facts_to_custom_data(facts: TrialFacts) -> dict[str, str]:
         bad = next((c for c in getattr(facts, name) if unicodedata.category(c) in _CONTROL), None)
         if bad is not None:
             raise UserError(f"{name} holds the control character {bad!r}; allowed is text on one line")
-    data = {"fibre": facts.fibre, "trial": facts.trial, "source": facts.source}
-    if facts.data_set:
-        data["data_set"] = facts.data_set
+    data = {name: getattr(facts, name) for name in _TEXTS if name != "data_set" or facts.data_set}
     for name in _OPTIONAL_NUMBERS + _POSITIVE_NUMBERS:
         value = getattr(facts, name)
         if value is not None:
@@ -53,33 +54,13 @@ def facts_from_custom_data(data: Mapping[str, str], where: str, fibre: str, tria
     Raises:
         UserError: a number or the phases cannot be read.
     """
-    optional = {name: _number(data[name], name, where) for name in _OPTIONAL_NUMBERS if name in data}
-    positive = {name: _number(data[name], name, where) for name in _POSITIVE_NUMBERS if name in data}
-    for name, value in positive.items():
-        if value <= 0.0:
-            raise UserError(f"bag {where}: custom_data {name} is {value!r}; allowed are numbers above 0")
-    return TrialFacts(
-        fibre=data.get("fibre", fibre),
-        trial=data.get("trial", trial),
-        pca=optional.get("pca"),
-        amplitude_l0=optional.get("amplitude_l0"),
-        recovery_s=optional.get("recovery_s"),
-        reference_length_m=positive.get("reference_length_m", 1.0),
-        f0_n=positive.get("f0_n", 1.0),
-        phases=_phases(data.get("phases", "[]"), where),
-        source=data.get("source", ""),
-        data_set=data.get("data_set", ""),
-    )
-
-
-def _number(text: str, name: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise UserError(f"bag {where}: custom_data {name} is '{text}'; allowed are finite numbers")
-    return value
+    known: dict[str, Any] = {name: data[name] for name in _TEXTS if name in data}
+    numbers = [name for name in _OPTIONAL_NUMBERS + _POSITIVE_NUMBERS if name in data]
+    known |= {name: finite(data[name], f"custom_data {name}", f"bag {where}") for name in numbers}
+    for name in _POSITIVE_NUMBERS:
+        if known.get(name, 1.0) <= 0.0:
+            raise UserError(f"bag {where}: custom_data {name} is {known[name]!r}; allowed are numbers above 0")
+    return replace(TrialFacts(fibre, trial, phases=_phases(data.get("phases", "[]"), where)), **known)
 
 
 def _phases(text: str, where: str) -> tuple[Phase, ...]:

@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import yaml
+
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials import fast_yaml
 from xb_muscle_ros.trials.bag_files import METADATA, clear_leftovers, mcap_files, plain
 from xb_muscle_ros.trials.bags import write_trial
-from xb_muscle_ros.trials.provenance import Provenance, provenance_of, recorded_provenance
+from xb_muscle_ros.trials.mcap_records import MAGIC
 from xb_muscle_ros.trials.readers.assembly import trial_of
 from xb_muscle_ros.trials.readers.base import Pending
+from xb_muscle_ros.trials.readers.description import filled
 from xb_muscle_ros.trials.readers.registry import READERS, recording_suffixes
 from xb_muscle_ros.trials.readers.settings import ImportSettings, MappingError, Prepared
 from xb_muscle_ros.trials.trial import Trial
+
+SOURCE = "import_source"
+SETTINGS = "import_settings"
+_BLOCK_BYTES = 1 << 20
 
 
 class Imported(NamedTuple):
@@ -127,7 +137,7 @@ def _import_file(path: Path, run: _Run) -> Iterator[Event]:
 
 
 def _import_trial(pending: Pending, prepared: Prepared, origin: Provenance, run: _Run) -> Event:
-    bag = run.out / bag_name(prepared.mapping.data_set_of(prepared.path), pending.trial)
+    bag = run.out / bag_name(filled(prepared.mapping.data_set, prepared.path), pending.trial)
     here = f"{prepared.path}, trial {pending.trial}"
     if bag.name in run.done:
         other = run.done[bag.name]
@@ -188,3 +198,58 @@ def _recordings_in(folder: Path, out: Path | None) -> Iterator[Path]:
                 yield path
         elif path.suffix.lower() in recording_suffixes():
             yield path
+
+
+class Provenance(NamedTuple):
+    """Where a bag comes from: name and digest of the file's content, and a digest of how it was read."""
+
+    source: str
+    settings: str
+
+    def custom_data(self) -> dict[str, str]:
+        """As a bag keeps it."""
+        return {SOURCE: self.source, SETTINGS: self.settings}
+
+
+def provenance_of(path: Path, settings: str) -> Provenance:
+    """Provenance of what is made of a file or a bag folder.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    digest = hashlib.sha256()
+    for file in _files_of(path):
+        digest.update(f"{file.name}\n".encode())
+        with file.open("rb") as opened:
+            while block := opened.read(_BLOCK_BYTES):
+                digest.update(block)
+    return Provenance(f"{path.name} sha256:{digest.hexdigest()}", settings)
+
+
+def recorded_provenance(bag: Path) -> Provenance | None:
+    """What a bag was imported from; None where it is not complete or was not imported."""
+    try:
+        tree = fast_yaml.load_text((bag / METADATA).read_bytes())
+        information = tree["rosbag2_bagfile_information"]
+        custom = information["custom_data"]
+        found = Provenance(custom[SOURCE], custom[SETTINGS])
+        files = [bag / Path(name).name for name in information["relative_file_paths"]]
+        complete = bool(files) and all(_ends_well(file) for file in files)
+    except (OSError, yaml.YAMLError, UnicodeDecodeError, KeyError, TypeError):
+        return None
+    return found if complete else None
+
+
+def _ends_well(file: Path) -> bool:
+    """Whether an MCAP file has its end: the writer puts it there last."""
+    with file.open("rb") as opened:
+        size = opened.seek(0, os.SEEK_END)
+        opened.seek(max(size - len(MAGIC), 0))
+        return opened.read() == MAGIC
+
+
+def _files_of(path: Path) -> Iterator[Path]:
+    if path.is_dir():
+        yield from (file for file in sorted(path.iterdir()) if file.is_file())
+    else:
+        yield path

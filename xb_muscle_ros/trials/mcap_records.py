@@ -79,73 +79,48 @@ def read_recording(path: Path, topics: Container[str] | None = None) -> Recordin
     data = path.read_bytes()
     if data[: len(MAGIC)] != MAGIC[: len(data)]:
         raise ValueError("it does not begin like an MCAP file")
-    reader = _Reader(topics)
+    recording = Recording()
+    schemas: dict[int, str] = {}
+    channels: dict[int, str] = {}
     try:
-        reader.file(memoryview(data))
-    except _CutError:
-        reader.recording.damage = f"cut short after {len(data)} bytes"
-    except _DamageError as damage:
-        reader.recording.damage = f"damaged, {damage}"
-    return reader.recording
-
-
-class _Reader:
-    def __init__(self, topics: Container[str] | None) -> None:
-        self.recording = Recording()
-        self._wanted = topics
-        self._schemas: dict[int, str] = {}
-        self._topics: dict[int, str] = {}
-
-    def file(self, data: memoryview) -> None:
-        for opcode, content in _records(data, len(MAGIC)):
+        for opcode, content in _records(memoryview(data), len(MAGIC)):
             if opcode == Opcode.FOOTER:
-                return
-            if opcode == Opcode.CHUNK:
-                self._records_of(_chunk(content, whole=True))
-            else:
-                self._record(opcode, content)
-        raise _CutError
-
-    def _records_of(self, chunk: bytes | memoryview) -> None:
-        for opcode, content in _records(memoryview(chunk), 0):
-            self._record(opcode, content)
-
-    def _record(self, opcode: int, content: memoryview) -> None:
-        if opcode == _CUT_CHUNK:
-            self._records_of(_chunk(content, whole=False))
+                break
+            try:
+                if opcode == Opcode.MESSAGE:
+                    channel, _, log_time_ns, _ = _MESSAGE.unpack_from(content)
+                    if channel not in channels:
+                        raise _DamageError(f"a message belongs to channel {channel}, which the file does not describe")
+                    if topics is None or channels[channel] in topics:
+                        message = Message(channels[channel], log_time_ns, bytes(content[_MESSAGE.size :]))
+                        recording.messages.append(message)
+                elif opcode == Opcode.SCHEMA:
+                    schema = Schema.read(_stream(content))
+                    schemas[schema.id] = schema.name
+                    if schema.data:
+                        text = bytes(schema.data).decode(errors="replace")
+                        recording.definitions[schema.name] = (schema.encoding, text)
+                elif opcode == Opcode.CHANNEL:
+                    described = Channel.read(_stream(content))
+                    channels[described.id] = described.topic
+                    recording.types[described.topic] = schemas.get(described.schema_id, "")
+                    recording.encodings[described.topic] = described.message_encoding
+                elif opcode == Opcode.METADATA:
+                    named = Metadata.read(_stream(content))
+                    recording.metadata[named.name] = named.metadata
+            except (struct.error, UnicodeDecodeError, McapError) as problem:
+                raise _DamageError(f"a record cannot be read ({problem})") from problem
+        else:
             raise _CutError
-        try:
-            if opcode == Opcode.MESSAGE:
-                channel, _, log_time_ns, _ = _MESSAGE.unpack_from(content)
-                if channel not in self._topics:
-                    raise _DamageError(f"a message belongs to channel {channel}, which the file does not describe")
-                topic = self._topics[channel]
-                if self._wanted is None or topic in self._wanted:
-                    message = Message(topic, log_time_ns, bytes(content[_MESSAGE.size :]))
-                    self.recording.messages.append(message)
-            elif opcode == Opcode.SCHEMA:
-                schema = Schema.read(_stream(content))
-                self._schemas[schema.id] = schema.name
-                if schema.data:
-                    text = bytes(schema.data).decode(errors="replace")
-                    self.recording.definitions[schema.name] = (schema.encoding, text)
-            elif opcode == Opcode.CHANNEL:
-                described = Channel.read(_stream(content))
-                self._topics[described.id] = described.topic
-                self.recording.types[described.topic] = self._schemas.get(described.schema_id, "")
-                self.recording.encodings[described.topic] = described.message_encoding
-            elif opcode == Opcode.METADATA:
-                named = Metadata.read(_stream(content))
-                self.recording.metadata[named.name] = named.metadata
-        except (struct.error, UnicodeDecodeError, McapError) as problem:
-            raise _DamageError(f"a record cannot be read ({problem})") from problem
-
-
-_CUT_CHUNK = -1
+    except _CutError:
+        recording.damage = f"cut short after {len(data)} bytes"
+    except _DamageError as damage:
+        recording.damage = f"damaged, {damage}"
+    return recording
 
 
 def _records(data: memoryview, position: int) -> Iterator[tuple[int, memoryview]]:
-    """Whole records as (opcode, content); what there is of a chunk that is cut comes as `_CUT_CHUNK`."""
+    """Whole records as (opcode, content); in place of a chunk those within it, as far as they are there."""
     while position < len(data):
         if position + _RECORD.size > len(data):
             raise _CutError
@@ -154,11 +129,13 @@ def _records(data: memoryview, position: int) -> Iterator[tuple[int, memoryview]
             raise _DamageError(f"there is no record where one should be, at byte {position}")
         position += _RECORD.size
         content = data[position : position + length]
-        if len(content) < length:
-            if opcode == Opcode.CHUNK:
-                yield _CUT_CHUNK, content
+        whole = len(content) == length
+        if opcode == Opcode.CHUNK:
+            yield from _records(memoryview(_chunk(content, whole)), 0)
+        elif whole:
+            yield opcode, content
+        if not whole:
             raise _CutError
-        yield opcode, content
         position += length
 
 

@@ -98,37 +98,30 @@ class StretchShortenStretch:
         for name, value in vars(self).items():
             ALLOWED[name].check(f"protocol: {name}", value)
 
+    def _stretches(self) -> list[tuple[str, float, float]]:
+        """Name, duration (s) and rise (L0) of each phase of non-zero duration, in order of time."""
+        ramp_s, test_s = (rise / self.speed_l0_per_s for rise in (self.amplitude_l0, self.test_stretch_l0))
+        all_of_them = (
+            ("isometric", self.lead_s, 0.0),
+            ("conditioning_stretch", ramp_s, self.amplitude_l0),
+            ("shortening", ramp_s, -self.amplitude_l0),
+            ("recovery", self.recovery_s, 0.0),
+            ("test_stretch", test_s, self.test_stretch_l0),
+            ("hold", self.hold_s, 0.0),
+        )
+        return [each for each in all_of_them if each[1] > 0.0]
+
     @property
     def phases(self) -> tuple[Phase, ...]:
         """All phases of non-zero duration, in order of time."""
-        ramp = self.amplitude_l0 / self.speed_l0_per_s
-        durations = (
-            ("isometric", self.lead_s),
-            ("conditioning_stretch", ramp),
-            ("shortening", ramp),
-            ("recovery", self.recovery_s),
-            ("test_stretch", self.test_stretch_l0 / self.speed_l0_per_s),
-            ("hold", self.hold_s),
-        )
-        phases, start = [], 0.0
-        for name, duration in durations:
-            if duration > 0.0:
-                phases.append(Phase(name, start, start + duration))
-                start += duration
-        return tuple(phases)
+        times = self.corners()[0].tolist()
+        return tuple(Phase(name, *times[i : i + 2]) for i, (name, _, _) in enumerate(self._stretches()))
 
     def corners(self) -> tuple[Array, Array]:
         """Times (s) and length changes (L0) of the corners; length is linear between them."""
-        rise = {
-            "conditioning_stretch": self.amplitude_l0,
-            "shortening": -self.amplitude_l0,
-            "test_stretch": self.test_stretch_l0,
-        }
-        times, lengths = [0.0], [0.0]
-        for phase in self.phases:
-            times.append(phase.end_s)
-            lengths.append(lengths[-1] + rise.get(phase.name, 0.0))
-        return np.array(times), np.array(lengths)
+        stretches = self._stretches()
+        durations, rises = ([each[i] for each in stretches] for i in (1, 2))
+        return np.cumsum([0.0, *durations]), np.cumsum([0.0, *rises])
 
     def trial(self, fibre: str, pca: float, rate_hz: float = 1000.0, name: str = "") -> Trial:
         """The protocol as a trial without measured force, in normalised units (1 m is one L0).

@@ -1,11 +1,10 @@
-"""Topics of a trial bag, their message type and quality of service, and stamps in ns."""
+"""Topics of a trial bag, their message type and their quality of service."""
 
 from __future__ import annotations
 
 import functools
 
 import numpy as np
-import numpy.typing as npt
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.store import Typestore
@@ -27,8 +26,6 @@ FORCE = "/muscle/force"
 MOMENTS = "/muscle/moments"
 # Order of messages with equal stamps: a node that steps on each length message has to hold the calcium by then.
 TOPICS = (CALCIUM, LENGTH, MEASURED_FORCE, FORCE, MOMENTS)
-# The field that carries the value of a topic's first joint.
-VALUE_FIELD = {CALCIUM: "position", LENGTH: "position", MEASURED_FORCE: "effort", FORCE: "effort", MOMENTS: "position"}
 
 LAST_STAMP_NS = (2**31 - 1) * 10**9 + 999_999_999  # builtin_interfaces/Time counts seconds in an int32
 _EMPTY: Array = np.empty(0)
@@ -71,14 +68,3 @@ def joint_state(
     header = std_msgs__msg__Header(stamp=stamp, frame_id="")
     message = JointState(header=header, name=names, position=position, velocity=velocity, effort=effort)
     return bytes(typestore().serialize_cdr(message, JOINT_STATE))
-
-
-def to_ns(time_s: Array) -> npt.NDArray[np.int64]:
-    """Times in s to stamps in ns, nearest; exact for stamps read with `to_s` up to 26 days."""
-    stamps: npt.NDArray[np.int64] = np.rint(np.asarray(time_s, dtype=np.float64) * 1e9).astype(np.int64)
-    return stamps
-
-
-def to_s(stamps_ns: npt.NDArray[np.int64]) -> Array:
-    """Stamps in ns to the nearest times in s."""
-    return stamps_ns / np.float64(1e9)

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.trial import Array
+from xb_muscle_ros.trials.trial import Array, frozen
 
 MOMENTS = ("q0", "q1", "q2", "n_on", "drx", "r")
 
@@ -44,8 +44,7 @@ class Simulated:
         object.__setattr__(self, "moments", MappingProxyType(moments))
 
     def _frozen(self, name: str, values: Array) -> Array:
-        array = np.ascontiguousarray(values, dtype=np.float64).copy()
+        array = frozen(values)
         if array.shape != np.shape(self.time_s) or array.ndim != 1:
             raise UserError(f"{name} has shape {array.shape}; needed is the shape of time_s, {np.shape(self.time_s)}")
-        array.setflags(write=False)
         return array

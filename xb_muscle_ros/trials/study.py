@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.alike import alike
 from xb_muscle_ros.trials.bag_files import find_bags
 from xb_muscle_ros.trials.bag_reading import TrialBag
 from xb_muscle_ros.trials.between_samples import with_corners
 from xb_muscle_ros.trials.checks import check_values
 from xb_muscle_ros.trials.completing import Known, complete, counted
 from xb_muscle_ros.trials.trial import Trial
+
+_BAG = re.compile(r"bag (.*?): ")
+_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+_NAMED = 3
 
 
 class Study(NamedTuple):
@@ -98,3 +102,28 @@ def _chosen(bag: TrialBag, fibre: str, only: str | None) -> str:
     listed = ", ".join(f"'{name}'" for name in bag.fibres)
     remedy = "--trials-of takes one of them"
     raise UserError(f"bag {bag.path} is of {'fibre' if alone else 'fibres'} {listed}, not of '{names[0]}'; {remedy}")
+
+
+def alike(lines: Iterable[str]) -> list[str]:
+    """Lines in their order; of those that differ in their bag and in numbers alone, the first, which names the others.
+
+    Args:
+        lines: begin with ``bag PATH: `` where they are of one bag; any other stays as it is.
+    """
+    first: dict[str, str] = {}
+    others: dict[str, list[str]] = {}
+    for line in lines:
+        bag = _BAG.match(line)
+        key = line if bag is None else _NUMBER.sub("0", line[bag.end() :])
+        if key not in first:
+            first[key] = line
+        elif bag is not None:
+            others.setdefault(key, []).append(Path(bag.group(1)).name)
+    return [line + _likewise(others.get(key, [])) for key, line in first.items()]
+
+
+def _likewise(bags: list[str]) -> str:
+    if not bags:
+        return ""
+    named = ", ".join(bags[:_NAMED]) + (", ..." if len(bags) > _NAMED else "")
+    return f" (likewise {len(bags)} more bag{'s' if len(bags) > 1 else ''}: {named})"

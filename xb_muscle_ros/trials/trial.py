@@ -12,6 +12,13 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 
+def frozen(values: npt.ArrayLike) -> Array:
+    """A read-only copy of numbers."""
+    array = np.ascontiguousarray(values, dtype=np.float64).copy()
+    array.setflags(write=False)
+    return array
+
+
 @dataclass(frozen=True)
 class Phase:
     """A named stretch of time within a trial.
@@ -85,9 +92,7 @@ class Trial:
 
     def __post_init__(self) -> None:
         for name in ("time_s", "length_m", "calcium_time_s", "calcium_um", "force_time_s", "force_n"):
-            array = np.ascontiguousarray(getattr(self, name), dtype=np.float64).copy()
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, frozen(getattr(self, name)))
 
     @property
     def length_change_l0(self) -> Array:

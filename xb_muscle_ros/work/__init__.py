@@ -1,7 +1,6 @@
 """Many independent computations: on the cores of this machine or on a Dask cluster, with progress, resumable."""
 
-from xb_muscle_ros.work.options import JsonValue, Options
 from xb_muscle_ros.work.outcome import TaskFailed
-from xb_muscle_ros.work.running import run, stream
+from xb_muscle_ros.work.running import JsonValue, Options, run, stream
 
 __all__ = ["JsonValue", "Options", "TaskFailed", "run", "stream"]

@@ -2,39 +2,42 @@
 
 from __future__ import annotations
 
+import abc
 import pickle
 from collections.abc import Callable
-from types import TracebackType
-from typing import Any, Protocol, TypeAlias
+from contextlib import AbstractContextManager
+from typing import Any, TypeAlias
 
 from xb_muscle_ros.work.outcome import Outcome, attempt
 
 Function: TypeAlias = Callable[[Any], Any]
 
 
-class Backend(Protocol):
+class Backend(AbstractContextManager["Backend"]):
     """Takes tasks of one function, gives outcomes in any order; ends all that it started with its ``with`` block."""
 
+    @abc.abstractmethod
     def busy(self) -> int:
         """Number of tasks whose outcome was not given yet."""
 
+    @abc.abstractmethod
     def full(self) -> bool:
         """Whether another task would only wait."""
 
+    @abc.abstractmethod
     def submit(self, index: int, task: object) -> None:
         """Take a task; its index comes back with its outcome."""
 
+    @abc.abstractmethod
     def collect(self) -> list[tuple[int, Outcome]]:
         """Wait for outcomes, at least one; only while busy."""
 
-    def __enter__(self) -> Backend: ...
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None: ...
+    @abc.abstractmethod
+    def __exit__(self, *_: object) -> None:
+        """End all that was started."""
 
 
-class Here:
+class Here(Backend):
     """See `Backend`. Works in this process, a task at a time."""
 
     def __init__(self, function: Function) -> None:
@@ -54,10 +57,5 @@ class Here:
         found, self._found = self._found, []
         return found
 
-    def __enter__(self) -> Here:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._found.clear()

@@ -8,17 +8,15 @@ import queue
 import sys
 import time
 import uuid
-from collections.abc import Mapping
+from collections.abc import Callable
 from concurrent.futures import CancelledError
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from xb_muscle_ros import plugins
 from xb_muscle_ros.progress import Progress
-from xb_muscle_ros.work.backend import Function
+from xb_muscle_ros.work.backend import Backend, Function
 from xb_muscle_ros.work.identity import describe, environment
 from xb_muscle_ros.work.outcome import Outcome
-from xb_muscle_ros.work.remote import performer
 from xb_muscle_ros.work.scheduler import PATIENCE_S, connect
 
 if TYPE_CHECKING:
@@ -30,7 +28,7 @@ _LOOK_S = 1.0
 _ALONE_S = 5.0
 
 
-class Cluster:
+class Cluster(Backend):
     """See `backend.Backend`. A task's function is looked up on the worker, under its module's name."""
 
     def __init__(self, function: Function, address: str, progress: Progress, quiet: bool) -> None:
@@ -39,12 +37,9 @@ class Cluster:
         Raises:
             UserError: see `connect`.
         """
-        self._function = function
-        self._address = address
-        self._progress = progress
-        self._quiet = quiet
+        self._function, self._address, self._progress, self._quiet = function, address, progress, quiet
         self._client = connect(address)
-        self._perform, self._mechanisms = performer(), plugins.texts()
+        self._perform, self._mechanisms = _performer(), plugins.texts()
         self._name = f"xb_muscle-{uuid.uuid4().hex}"
         self._flying: dict[str, tuple[int, object, Future]] = {}
         self._finished: queue.SimpleQueue[Future] = queue.SimpleQueue()
@@ -70,6 +65,7 @@ class Cluster:
         future = self._client.submit(
             self._perform, payload, environment(), self._mechanisms, key=key, pure=False, retries=_RETRIES
         )
+        # With the future: Dask drops the work of one that nobody holds.
         self._flying[key] = index, task, future
         future.add_done_callback(self._finished.put)
 
@@ -78,9 +74,7 @@ class Cluster:
             # With an end, so that an interrupt and a missing worker are noticed.
             with contextlib.suppress(queue.Empty):
                 futures = [self._finished.get(timeout=_LOOK_S)]
-                with contextlib.suppress(queue.Empty):
-                    while True:
-                        futures.append(self._finished.get_nowait())
+                futures += [self._finished.get() for _ in range(self._finished.qsize())]
                 return self._outcomes(futures)
             self._look()
 
@@ -131,7 +125,13 @@ class Cluster:
         with contextlib.suppress(OSError):
             threads = self._client.nthreads()
             self._workers = len(threads)
-            self._advise(threads)
+            crowded = next((address for address, count in threads.items() if count > 1), None)
+            if crowded is not None and not self._advised:
+                self._advised = True
+                self._say(
+                    f"Dask worker {crowded} has {threads[crowded]} threads, but one process does one task at a time; "
+                    "to use all cores, start it with --nthreads 1 --nworkers N"
+                )
         if self._workers:
             self._alone_since_s = now
         elif now - self._alone_since_s > _ALONE_S:
@@ -141,24 +141,45 @@ class Cluster:
                 f"dask worker {self._address} --nthreads 1 --nworkers N"
             )
 
-    def _advise(self, threads: Mapping[str, int]) -> None:
-        crowded = next((address for address, count in threads.items() if count > 1), None)
-        if crowded is not None and not self._advised:
-            self._advised = True
-            self._say(
-                f"Dask worker {crowded} has {threads[crowded]} threads, but one process does one task at a time; "
-                "to use all cores, start it with --nthreads 1 --nworkers N"
-            )
-
     def _say(self, line: str) -> None:
         if not self._quiet:
             self._progress.write(f"xb_muscle: {line}", sys.stderr)
 
-    def __enter__(self) -> Cluster:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         # What is under way is of no use to anybody once its client has gone.
         self._client.close(timeout=PATIENCE_S)
+
+
+def _performer() -> Callable[[bytes, dict[str, str], dict[str, str]], tuple[str, ...]]:
+    """The function that carries out a task on a worker, if the worker would come to the caller's result.
+
+    It takes what `attempt` takes, the caller's `environment`, and its mechanisms as `plugins.texts` gives them, which a
+    worker takes with its first task; it gives kind and text of the `Outcome`. It is a local function, because those
+    travel whole instead of by name: so it can speak even on a worker that lacks this package, and the scheduler need
+    not have it.
+    """
+
+    def perform(payload: bytes, environment: dict[str, str], mechanisms: dict[str, str]) -> tuple[str, ...]:
+        from distributed import get_worker
+
+        worker = f"Dask worker {get_worker().address}"
+        try:
+            from xb_muscle_ros import plugins
+            from xb_muscle_ros.work.identity import differences
+            from xb_muscle_ros.work.outcome import attempt
+        except ImportError as error:
+            return (
+                "user_error",
+                f"{worker} cannot load the package ({error}); install this process's xb_muscle_ros there",
+            )
+        if mechanisms and not plugins.files():
+            plugins.use(mechanisms)
+        unlike = differences(environment)
+        if unlike:
+            return (
+                "user_error",
+                f"{worker} has {unlike}; give workers the same environment as this process, or start them anew",
+            )
+        return tuple(attempt(payload))
+
+    return perform

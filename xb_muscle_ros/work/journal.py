@@ -5,8 +5,8 @@ from __future__ import annotations
 import fcntl
 import json
 import os
+from contextlib import AbstractContextManager
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
@@ -15,7 +15,7 @@ _HEADER = b'{"format":"xb_muscle_ros journal","version":1}\n'
 _FORMAT = b'{"format":"xb_muscle_ros journal",'
 
 
-class Journal:
+class Journal(AbstractContextManager["Journal"]):
     """Results by key, in a file; open in one process at a time.
 
     The first line names format and version; every other line is ``{"key": ..., "value": ...}``. A last line that was
@@ -71,12 +71,7 @@ class Journal:
         """Close the file; another run may then open it."""
         self._file.close()
 
-    def __enter__(self) -> Journal:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _lock(self) -> None:

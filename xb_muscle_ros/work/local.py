@@ -14,13 +14,11 @@ from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from types import TracebackType
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.work.backend import Function
+from xb_muscle_ros.work.backend import Backend, Function
 from xb_muscle_ros.work.identity import describe
-from xb_muscle_ros.work.outcome import Outcome
-from xb_muscle_ros.work.worker import serve
+from xb_muscle_ros.work.outcome import Outcome, attempt
 
 _PATIENCE_S = 5.0
 # A task may lose this many workers; a worker that cannot even start is tried as often.
@@ -42,7 +40,7 @@ class _Worker:
     started: bool = False
 
 
-class Pool:
+class Pool(Backend):
     """See `backend.Backend`. Processes are started (spawned, not forked) as there is work for them."""
 
     def __init__(self, function: Function, processes: int) -> None:
@@ -134,17 +132,11 @@ class Pool:
             self._waiting.appendleft(job)
         return []
 
-    def __enter__(self) -> Pool:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         processes = [worker.process for worker in self._workers.values()]
-        at_work = [worker.process for worker in self._workers.values() if worker.job is not None]
-        for process in at_work:
-            process.terminate()
-        for pipe in self._workers:
+        for pipe, worker in self._workers.items():
+            if worker.job is not None:
+                worker.process.terminate()
             pipe.close()
         self._workers.clear()
         _end(processes, _PATIENCE_S)
@@ -214,3 +206,28 @@ def _one_thread_each() -> Iterator[None]:
                 del os.environ[name]
             else:
                 os.environ[name] = value
+
+
+def serve(pipe: Connection) -> None:
+    """Say that it is there (None), then answer every payload with its outcome.
+
+    An interrupt at the terminal reaches this process too; what is to happen then is the parent's business.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    try:
+        pipe.send(None)
+        while True:
+            pipe.send(attempt(pipe.recv_bytes()))
+    except (EOFError, OSError):
+        # The parent has closed its end, or is no more.
+        return
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        # Even in the middle of a task: nobody is left to take its result.
+        os._exit(1)

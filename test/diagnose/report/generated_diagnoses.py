@@ -9,18 +9,16 @@ from hypothesis import strategies as st
 
 from xb_muscle_ros.diagnose.component import NAMED, Component, HeldOutGain, Kind, OfFibre, Parameter
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, MECHANISMS
+from xb_muscle_ros.diagnose.residual import AnswerResidual, Place, ResidualLaw, ResidualMap
 from xb_muscle_ros.diagnose.result import (
     FORMAT,
     Diagnosis,
     Feature,
     FeatureScore,
-    Law,
     NextExperiment,
-    Nuisance,
+    NuisanceParameter,
     OfStudyFibre,
     OfTrial,
-    Place,
-    Remaining,
     Scores,
     SetOfMechanisms,
     Verdict,
@@ -86,7 +84,7 @@ def diagnoses(draw: Any, holes: bool = True) -> Diagnosis:
         return draw(few(made))
 
     laws = st.builds(
-        Law, st.sampled_from(fibres), unknown(st.floats(1e-3, 5.0)) if holes else st.floats(1e-3, 5.0),
+        ResidualLaw, st.sampled_from(fibres), unknown(st.floats(1e-3, 5.0)) if holes else st.floats(1e-3, 5.0),
         st.sampled_from(["constant", "activation", "calcium", "force"]), plain, share, few(FORCES), few(plain),
         st.dictionaries(st.sampled_from(["constant", "force"]), share),
     )  # fmt: skip
@@ -109,17 +107,20 @@ def diagnoses(draw: Any, holes: bool = True) -> Diagnosis:
         for f in fibres
     )  # fmt: skip
     grid = draw(st.lists(st.one_of(st.none(), FORCES), min_size=len(PHASES), max_size=len(PHASES)))
-    maps: dict[str, dict[str, list[object]]] = {
-        fibres[0]: {"trials": [trials[0][1]], "phases": list(PHASES), "rms_f0": [grid], "mean_f0": [grid]}
+    holes_of = tuple(grid)
+    maps = {
+        fibres[0]: ResidualMap(
+            (trials[0][1],), tuple(PHASES), (holes_of,), (holes_of,), (holes_of,), ((False,) * len(PHASES),)
+        )
     }
     return Diagnosis(
         FORMAT, fibres, "3state_coop", "gaussian", draw(st.booleans()), 1, 2.5, draw(st.sampled_from(Verdict)),
         tuple(c.name for c in parts if c.kind is Kind.MECHANISM and c.inclusion_probability >= NAMED), tuple(parts),
         draw(share), places(), draw(SHARES), draw(st.booleans()),
-        Remaining(draw(force), draw(force), places(), draw(optional(laws))), draw(optional(laws)), draw(scores),
+        AnswerResidual(draw(force), draw(force), places(), draw(optional(laws))), draw(optional(laws)), draw(scores),
         draw(scores), draw(optional(gains)), draw(optional(force)),
         draw(few(st.builds(SetOfMechanisms, sets, SHARES, plain, force, st.booleans()))), study, rows,
-        draw(few(st.builds(Nuisance, st.sampled_from(fibres), WORDS, WORDS, WORDS, plain, optional(plain), FORCES))),
+        draw(few(st.builds(NuisanceParameter, st.sampled_from(fibres), *[WORDS] * 3, plain, optional(plain), FORCES))),
         draw(few(st.builds(Feature, st.sampled_from(fibres), WORDS, WORDS, plain, plain, plain, st.booleans()))),
         draw(few(st.builds(FeatureScore, WORDS, WORDS, st.integers(1, 84), FORCES, FORCES))),
         maps if draw(st.booleans()) else {}, maps if draw(st.booleans()) else {},

@@ -10,6 +10,7 @@ from made_recordings import PHASES
 from sample_diagnoses import Sample, one_fibre
 
 from xb_muscle_ros.diagnose.component import OfFibre
+from xb_muscle_ros.diagnose.residual import ResidualMap
 from xb_muscle_ros.diagnose.result import OfTrial
 
 
@@ -46,8 +47,9 @@ def many(fibres: int, trials: int, phases: int, parts: int, long: bool = False) 
             traces.append(replace(like, fibre=fibre, trial=trial, without_f0=shown))
         listed = [rows[-trials + i].trial for i in range(trials)]
         for maps_of, scale in zip(maps, (1.0, 0.4), strict=True):
-            table = {"trials": listed, "phases": kinds, "rms_f0": (1.2 * scale * np.abs(sizes)).tolist()}
-            maps_of[fibre] = {**table, "mean_f0": (scale * sizes).tolist(), "counts": (sizes > 0.05).tolist()}
+            rms, mean, p = (tuple(map(tuple, (v * scale * sizes).tolist())) for v in (1.2 * np.sign(sizes), 1.0, 0.0))
+            counts = tuple(map(tuple, (sizes > 0.05).tolist()))
+            maps_of[fibre] = ResidualMap(tuple(listed), tuple(kinds), rms, mean, p, counts)
     study = tuple(replace(d.by_fibre[0], fibre=f, left_out_rmsd_f0=(0.03, 0.02) if fibres > 1 else None) for f in names)
     made_of = replace(
         d, fibres=names, components=tuple(components_), trials=tuple(rows), by_fibre=study, map_before=maps[0],

@@ -22,17 +22,15 @@ from made_recordings import (
 
 from xb_muscle_ros.diagnose.component import Component, HeldOutGain, Kind, OfFibre
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
+from xb_muscle_ros.diagnose.residual import AnswerResidual, Place, ResidualLaw, ResidualMap
 from xb_muscle_ros.diagnose.result import (
     FORMAT,
     Diagnosis,
     Feature,
-    Law,
     NextExperiment,
-    Nuisance,
+    NuisanceParameter,
     OfStudyFibre,
     OfTrial,
-    Place,
-    Remaining,
     Scores,
     SetOfMechanisms,
     Verdict,
@@ -73,20 +71,22 @@ def places(traces: list[TrialTraces], rows: tuple[OfTrial, ...], of: str) -> tup
     return tuple(sorted(found, key=lambda p: -p.size_f0))
 
 
-def residual_map(traces: list[TrialTraces], of: str) -> dict[str, dict[str, list[object]]]:
-    out: dict[str, dict[str, list[object]]] = {}
-    for t in traces:
-        table = out.setdefault(
-            t.fibre,
-            {"trials": [], "phases": [p[0] for p in PHASES], "rms_f0": [], "mean_f0": [], "p_value": [], "counts": []},
+def residual_map(traces: list[TrialTraces], of: str) -> dict[str, ResidualMap]:
+    out = {}
+    for fibre in dict.fromkeys(t.fibre for t in traces):
+        own = [t for t in traces if t.fibre == fibre]
+        rows = []
+        for t in own:
+            left = t.measured_f0 - getattr(t, of)
+            rows.append([left[(t.time_s >= start) & (t.time_s < end)] for _, start, end in PHASES])
+        out[fibre] = ResidualMap(
+            tuple(t.trial for t in own),
+            tuple(p[0] for p in PHASES),
+            tuple(tuple(rms(p) for p in parts) for parts in rows),
+            tuple(tuple(float(p.mean()) for p in parts) for parts in rows),
+            tuple(tuple(0.002 if rms(p) > 0.006 else 0.4 for p in parts) for parts in rows),
+            tuple(tuple(rms(p) > 0.006 for p in parts) for parts in rows),
         )
-        left = t.measured_f0 - getattr(t, of)
-        parts = [left[(t.time_s >= start) & (t.time_s < end)] for _, start, end in PHASES]
-        table["trials"].append(t.trial)
-        table["rms_f0"].append([rms(p) for p in parts])
-        table["mean_f0"].append([float(p.mean()) for p in parts])
-        table["p_value"].append([0.002 if rms(p) > 0.006 else 0.4 for p in parts])
-        table["counts"].append([rms(p) > 0.006 for p in parts])
     return out
 
 
@@ -171,9 +171,9 @@ def sample(
         )
         for of in ("before", "after")
     )
-    left = Law(fibres[0], 0.087, "force", 0.11, 0.38, tuple(np.geomspace(0.002, 5.0, 11).tolist()),
+    left = ResidualLaw(fibres[0], 0.087, "force", 0.11, 0.38, tuple(np.geomspace(0.002, 5.0, 11).tolist()),
                (0.0, 0.0, 0.001, 0.0, 0.004, 0.003, 0.0, 0.0, 0.0, 0.001, 0.0), {"constant": 0.2})  # fmt: skip
-    law = Law(
+    law = ResidualLaw(
         fibres[0], 0.0118, "activation", 0.42, 0.63, tuple(np.geomspace(0.002, 5.0, 11).tolist()),
         (0.0, 0.002, 0.011, 0.006, 0.0, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0),
         {"constant": 0.31, "calcium": 0.44, "force": 0.6},
@@ -186,17 +186,17 @@ def sample(
         SetOfMechanisms((), 1e-5, -11.2, before.train_rmsd_f0, True),
     ]
     nuisances = [
-        Nuisance(fibre, "pca_shift", f"pCa {pca:g}", "1", 0.03 * math.sin(9.0 * pca), 0.012, 0.05)
+        NuisanceParameter(fibre, "pca_shift", f"pCa {pca:g}", "1", 0.03 * math.sin(9.0 * pca), 0.012, 0.05)
         for fibre in fibres
         for pca in PCAS
     ]
-    nuisances += [Nuisance(fibre, "time_shift", "", "s", 4.1e-4, 1.2e-4, 7e-4) for fibre in fibres]
+    nuisances += [NuisanceParameter(fibre, "time_shift", "", "s", 4.1e-4, 1.2e-4, 7e-4) for fibre in fibres]
     explained = 1.0 - (after.train_rmsd_f0**2 - NOISE_F0**2) / (before.train_rmsd_f0**2 - NOISE_F0**2)
     mechanisms = tuple(c.name for c in named if c.kind is Kind.MECHANISM)
     d = Diagnosis(
         FORMAT, fibres, "3state_coop", "gaussian", False, 1, 81.2, verdict, mechanisms, parts, explained,
         places(traces, rows, "before_f0"), 0.002, True,
-        Remaining(after.train_rmsd_f0, NOISE_F0, places(traces, rows, "after_f0"), left if effects else law),
+        AnswerResidual(after.train_rmsd_f0, NOISE_F0, places(traces, rows, "after_f0"), left if effects else law),
         law, before, after,
         gain_of(traces, ""), 0.7 * (after.heldout_rmsd_f0 or 0.0), tuple(sets),
         study_rows(traces, effects, fibres), rows, tuple(nuisances),
@@ -233,7 +233,7 @@ def nothing() -> Sample:
     found = sample(effects=(), unknown_f0=0.0, verdict=Verdict.NONE)
     d = found.diagnosis
     quiet = replace(
-        d, explained_share=0.0, p_value=0.41, base_law=None, remaining=replace(d.remaining, law=None, where=()),
+        d, explained_fraction=0.0, p_value=0.41, base_law=None, residual=replace(d.residual, law=None, places=()),
         heldout_gain=None, benchmark_rmsd_f0=None, features=(), next_experiment=None, warnings=(), notes=(),
         missing=(), before=replace(d.before, heldout_rmsd_f0=None), after=replace(d.after, heldout_rmsd_f0=None),
         trials=tuple(replace(t, heldout_before_f0=None, heldout_after_f0=None) for t in d.trials),

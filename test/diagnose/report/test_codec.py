@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ from sample_diagnoses import ALL, one_fibre
 
 from xb_muscle_ros.diagnose.component import Component
 from xb_muscle_ros.diagnose.report.codec import from_json, to_json
-from xb_muscle_ros.diagnose.result import Diagnosis, Verdict
+from xb_muscle_ros.diagnose.residual import ResidualMap
+from xb_muscle_ros.diagnose.result import FORMAT, Diagnosis, Verdict
 from xb_muscle_ros.errors import UserError
 
 
@@ -32,7 +34,7 @@ def test_what_is_not_finite_is_null_and_comes_back_as_nan_or_none(d: Diagnosis) 
     again = from_json(row)
     assert to_json(again) == row
     for c, other in zip(d.components, again.components, strict=True):
-        assert math.isnan(c.share_of_mismatch) == math.isnan(other.share_of_mismatch)
+        assert math.isnan(c.ablation_loss) == math.isnan(other.ablation_loss)
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -49,14 +51,17 @@ def test_numbers_of_numpy_are_numbers() -> None:
     d = one_fibre().diagnosis
     odd = dataclasses.replace(
         d,
-        explained_share=np.float64(0.25),
+        explained_fraction=np.float64(0.25),
         seed=np.int64(3),
         described=np.bool_(True),
-        map_before={"18Dec2017a": {"rms_f0": [[np.float64(math.nan), np.float32(0.5)]], "counts": [[np.bool_(False)]]}},
+        map_before={
+            "18Dec2017a": ResidualMap(rms_f0=((np.float64(math.nan), np.float32(0.5)),), counts=((np.bool_(False),),))
+        },
     )
     row = json.loads(json.dumps(to_json(odd), allow_nan=False))
-    assert (row["explained_share"], row["seed"], row["described"]) == (0.25, 3, True)
-    assert row["map_before"] == {"18Dec2017a": {"rms_f0": [[None, 0.5]], "counts": [[False]]}}
+    assert (row["explained_fraction"], row["seed"], row["described"]) == (0.25, 3, True)
+    table = row["map_before"]["18Dec2017a"]
+    assert (table["rms_f0"], table["counts"]) == ([[None, 0.5]], [[False]])
 
 
 def test_what_has_no_place_in_json_is_an_error_of_the_program() -> None:
@@ -69,11 +74,28 @@ def changed(**changes: Any) -> dict[str, Any]:
 
 
 def test_fields_with_a_default_may_be_missing_and_further_keys_are_passed_over() -> None:
-    row = changed(summary="In words.", how={})
+    row = changed(summary="In words.", glossary={})
     del row["features"], row["notes"]
     d = from_json(row)
     assert d.features == ()
     assert d.verdict is Verdict.PHYSICS
+
+
+def test_a_file_of_the_former_format_is_read() -> None:
+    """`format_2.json`: a quick diagnosis of a made study by the version that wrote format 2, its lists cut short."""
+    row = json.loads((Path(__file__).parent / "format_2.json").read_text(encoding="utf-8"))
+    assert row["format_version"] == 2
+    d = from_json(row)
+    assert d.format_version == FORMAT
+    assert d.explained_fraction == row["explained_share"]
+    assert d.residual.rmsd_f0 == row["remaining"]["rmsd_f0"]
+    assert len(d.residual.places) == len(row["remaining"]["where"]) == 2
+    assert [c.ablation_loss for c in d.components] == [c["share_of_mismatch"] for c in row["components"]]
+    assert [n.value for n in d.nuisance_parameters] == [n["value"] for n in row["nuisances"]]
+    assert {t.noise_source for t in d.trials} == {"window"}
+    assert d.p_value_floor == 0.0
+    assert from_json(to_json(d)) == d
+    assert "share" not in json.dumps(to_json(d))
 
 
 OLD = {"version": 1, "fibre": "18Dec2017a", "verdict": "physics"}
@@ -83,7 +105,7 @@ OLD = {"version": 1, "fibre": "18Dec2017a", "verdict": "physics"}
     ("row", "told"),
     [
         (OLD, r"older version \(format 1\); run xb_muscle diagnose again"),
-        (changed(format_version=3), "format_version is 3, this version reads 2"),
+        (changed(format_version=4), "format_version is 4, this version reads 2 and 3"),
         ({}, "format_version is None"),
         ([1], "holds a list"),
         (changed(verdict="guess"), "verdict is 'guess'; it has to be one of none, measurement"),
@@ -91,8 +113,8 @@ OLD = {"version": 1, "fibre": "18Dec2017a", "verdict": "physics"}
         (changed(seed=True), "seed is True"),
         (changed(quick=0), "quick is 0; it has to be true or false"),
         (changed(model=None), "model is None; it has to be text"),
-        (changed(explained_share="much"), "explained_share is 'much'; it has to be a number"),
-        (changed(explained_share=False), "explained_share is False"),
+        (changed(explained_fraction="much"), "explained_fraction is 'much'; it has to be a number"),
+        (changed(explained_fraction=False), "explained_fraction is False"),
         (changed(fibres="18Dec2017a"), "fibres is '18Dec2017a'; it has to be a list"),
         (changed(trials=[[]]), r"trials\[0\] is \[\]; it has to be an object"),
         (changed(map_before=[]), "map_before is .*an object"),

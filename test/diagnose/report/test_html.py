@@ -16,7 +16,7 @@ from many_of_everything import many
 from sample_diagnoses import ALL, Sample, one_fibre
 
 from xb_muscle_ros.diagnose.report import html, prose
-from xb_muscle_ros.diagnose.report.glossary import GLOSSARY, how
+from xb_muscle_ros.diagnose.report.glossary import GLOSSARY
 from xb_muscle_ros.diagnose.result import Diagnosis
 
 
@@ -117,8 +117,8 @@ def test_the_order_of_the_page() -> None:
     assert text.index("Figure 1.") < text.index('<div class="verdict">') < text.index("Figure 2.")
     assert "held-out" in text[: text.index('<div class="verdict">')].lower() or "did not see" in text
     assert [plain(h) for h in walked(text).headings][1:] == [
-        "Components", "Where the base model differs", "What each component adds", "Fibres side by side", "What remains",
-        "Features", "Ordinary errors, trials and parameters", "Sets averaged over", "Next experiment",
+        "Components", "Where the base model differs", "What each component adds", "Fibres side by side", "Residual",
+        "Features", "Ordinary artefacts, trials and parameters", "Sets averaged over", "Next experiment",
         "Warnings and notes", "Glossary",
     ]  # fmt: skip
     assert "Fibres side by side" not in walked(page("one_fibre")).headings
@@ -129,12 +129,11 @@ def test_terms_are_explained_where_they_stand_and_in_one_place() -> None:
     text = page("one_fibre")
     walker = walked(text)
     used = {link.removeprefix("#g-") for link in walker.links if link.startswith("#g-")}
-    assert {"inclusion_probability", "share_of_mismatch", "heldout_gain", "interval", "not_separable_from"} <= used
+    assert {"inclusion_probability", "ablation_loss", "heldout_gain", "interval", "not_separable_from"} <= used
     for key in used:
         assert GLOSSARY[key].text.split(".")[0].split("(")[0] in plain(walker.text)
         assert 'title="' in text
     assert {f"g-{key}" for key in GLOSSARY} <= set(walker.ids)
-    assert how() == {key: term.text for key, term in GLOSSARY.items()}
 
 
 def test_terms_are_a_sentence_or_two() -> None:
@@ -154,6 +153,16 @@ def test_numbers_of_the_record_stand_on_the_page() -> None:
                  "forcible detachment + viscous drag + force drift 0.52", "f 95.0 103 1/s", "augmented/18Dec2017a.yaml",
                  "time constant of 11.8 ms, scales with activation"):  # fmt: skip
         assert told in words, told
+
+
+def test_bounds_and_beaten_benchmarks_are_said() -> None:
+    d = one_fibre().diagnosis
+    words = plain(walked(without_figures(replace(d, p_value_floor=0.002, benchmark_rmsd_f0=0.9))).text)
+    assert "The p-value of the mismatch is ≤ 0.0020" in words
+    assert "benchmark 90 % F0 (worse than the base)" in words
+    before = plain(walked(without_figures(d)).text)
+    assert "The p-value of the mismatch is 0.0020" in before
+    assert "worse than the base" not in before.split("Glossary")[0]
 
 
 def test_where_the_answer_is_the_base_nothing_is_told_twice() -> None:
@@ -179,7 +188,7 @@ def test_long_tables_say_what_they_leave_out() -> None:
 @given(diagnoses())
 def test_any_record_makes_a_page_without_gaps(d: Diagnosis) -> None:
     # Words drawn at random may be anything.
-    bare = replace(d, warnings=(), missing=(), notes=(), nuisances=(), features=(), next_experiment=None)
+    bare = replace(d, warnings=(), missing=(), notes=(), nuisance_parameters=(), features=(), next_experiment=None)
     walker = walked(without_figures(bare))
     assert not re.search(r"\bnan\b|\binf\b", walker.text)
     assert not re.search(r"\bNone\b", walker.text.replace("None:", "").replace("None.", ""))
@@ -201,6 +210,7 @@ def test_names_may_hold_anything(turn: int) -> None:
     def trial(name: str) -> str:
         return names[int(name[-2:]) % 4] + name
 
+    known = d.map_before["18Dec2017a"]
     swapped = replace(
         d, fibres=(fibre,), warnings=tuple(names), missing=tuple(names), notes=tuple(names), model=names[2],
         trials=tuple(replace(t, fibre=fibre, trial=trial(t.trial)) for t in d.trials),
@@ -210,9 +220,8 @@ def test_names_may_hold_anything(turn: int) -> None:
             for k, c in enumerate(d.components)
         ),
         by_fibre=tuple(replace(f, fibre=fibre) for f in d.by_fibre), augmented={fibre: names[3]},
-        map_before={fibre: {**d.map_before["18Dec2017a"], "trials": [trial(str(t)) for t in
-                                                                     d.map_before["18Dec2017a"]["trials"]]}},
-        nuisances=tuple(replace(n, group=names[3]) for n in d.nuisances[:2]),
+        map_before={fibre: replace(known, trials=tuple(trial(t) for t in known.trials))},
+        nuisance_parameters=tuple(replace(n, group=names[3]) for n in d.nuisance_parameters[:2]),
     )  # fmt: skip
     renamed = tuple(
         replace(t, fibre=fibre, trial=trial(t.trial),
@@ -241,7 +250,18 @@ def test_units_do_not_part_from_their_numbers() -> None:
 
 
 def test_templates_and_style_are_installed_with_the_package() -> None:
-    for name in ("page", "macros", "components", "where", "fibres", "remains", "features", "errors", "sets", "closing"):
+    for name in (
+        "page",
+        "macros",
+        "components",
+        "where",
+        "fibres",
+        "residual",
+        "features",
+        "artefacts",
+        "sets",
+        "closing",
+    ):
         assert html.source(f"templates/{name}.html.j2").strip()
     assert "@media print" in html.source("report.css")
     assert html.source("report.css") in page("nothing")

@@ -98,10 +98,11 @@ def check_headline(d: Diagnosis) -> None:
         assert "Nothing is named" in said(d)
         return
     assert text.startswith(d.verdict.value.capitalize())
-    if " explain" in text:
+    quiet = ("no candidate", "none of the", "do not call for", "are enough")
+    if " explain" in text and not any(words in text for words in quiet):
         assert d.verdict is Verdict.PHYSICS
         assert say.mechanisms(d.named)
-    if "no candidate" in text or "as good as" in text or "are enough" in text:
+    if any(words in text for words in quiet):
         assert not d.named
 
 
@@ -117,6 +118,15 @@ def test_a_probability_is_never_shown_larger_than_it_is(value: float) -> None:
         assert (number >= SURE) == (value >= SURE) or math.isclose(value, SURE)
 
 
+def test_a_p_value_at_the_floor_of_the_bootstrap_is_a_bound() -> None:
+    floor = 2.0 / 201.0
+    assert say.p_value(floor, floor) == "≤ 0.010"
+    assert say.p_value(0.5 * floor, floor) == "≤ 0.0050"
+    assert say.p_value(1.5 * floor, floor) == "0.015"
+    assert say.p_value(0.0004) == "< 0.001"
+    assert say.p_value(math.nan, floor) == say.NOTHING
+
+
 @given(st.floats(-2.0, 2.0))
 def test_a_share_is_between_nothing_and_all(value: float) -> None:
     number = int(say.share(value).strip("<> %"))
@@ -126,8 +136,8 @@ def test_a_share_is_between_nothing_and_all(value: float) -> None:
 
 
 def test_physics_that_explains_a_part_says_what_remains_and_where() -> None:
-    d = replace(one_fibre().diagnosis, explained_share=0.4)
-    d = replace(d, remaining=replace(d.remaining, rmsd_f0=0.016))
+    d = replace(one_fibre().diagnosis, explained_fraction=0.4)
+    d = replace(d, residual=replace(d.residual, rmsd_f0=0.016))
     assert headline(d) == (
         "Physics: forcible detachment, viscous drag and force drift explain 40 % of the mismatch; 1.6 % F0 remain"
     )
@@ -137,7 +147,7 @@ def test_physics_that_explains_a_part_says_what_remains_and_where() -> None:
         "Forcible detachment is almost certainly part of what the base model lacks (probability > 0.99); viscous drag "
         "very likely (0.93)."
     )
-    assert told[3] == "Force drift is probably beyond ordinary measurement error (probability 0.87)."
+    assert told[3] == "Force drift is probably a measurement artefact beyond the ordinary (probability 0.87)."
     assert "40 % of the mismatch" in told[4]
     assert "; they leave 1.6 % F0, most in the test stretch" in told[4]
     assert told[5].startswith("Next: record a stretch")
@@ -188,7 +198,7 @@ def test_ambiguous_says_why(gain: str | None, told: str) -> None:
 
 def test_nothing_named() -> None:
     d = nothing().diagnosis
-    assert headline(d) == "None: the model as given is as good as these recordings can tell"
+    assert headline(d) == "None: these recordings do not call for another model"
     assert "Noise alone leaves as much in about 4 of 10 repeats." in summary(d)
     assert summary(d)[-1] == "No experiment is called for."
     other = replace(d, verdict=Verdict.PARAMETERS)
@@ -202,14 +212,14 @@ def test_unexplained_tells_the_nearest_and_the_law() -> None:
     text = said(d)
     assert "No mechanism reaches a probability of 0.5; the most probable is weakly bound heads (0.34)." in text
     assert "time constant of 11.8 ms and scales with the activation of the thin filament" in text
-    assert headline(d).startswith("Unexplained: 1.")
-    assert "fades after stretch" not in said(replace(d, base_law=None, remaining=replace(d.remaining, law=None)))
+    assert headline(d) == "Unexplained: the base model differs by 1.1 % F0; none of the 7 candidates explains it"
+    assert "decays after a stretch" not in said(replace(d, base_law=None, residual=replace(d.residual, law=None)))
 
 
 def test_measurement_alone_asks_to_check_the_recordings() -> None:
     d = replace(measurement().diagnosis, next_experiment=None)
     assert headline(d) == "Measurement: force drift beyond what is ordinary"
-    assert "Force drift is very likely beyond ordinary measurement error (probability 0.97)." in summary(d)
+    assert "Force drift is very likely a measurement artefact beyond the ordinary (probability 0.97)." in summary(d)
     assert summary(d)[-1] == "Next: check the recordings for force drift."
 
 

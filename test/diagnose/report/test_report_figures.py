@@ -13,7 +13,7 @@ from layout_of_figures import boxes, outside, touching
 from many_of_everything import many
 from sample_diagnoses import ALL, Sample, five_fibres, nothing, one_fibre, unexplained
 
-from xb_muscle_ros.diagnose.report.figures import before_after, fibres, laws, parts, probabilities, remains
+from xb_muscle_ros.diagnose.report.figures import before_after, contributions, fibres, laws, probabilities, residual_map
 from xb_muscle_ros.diagnose.report.figures.common import Figure, trial_labels
 from xb_muscle_ros.diagnose.result import Diagnosis
 
@@ -26,9 +26,9 @@ def draw_all(sample: Sample) -> dict[str, Figure | None]:
     return {
         "before_after": before_after.draw_before_after(d, traces),
         "probabilities": probabilities.draw_probabilities(d),
-        "parts": parts.draw_parts(d, traces),
+        "contributions": contributions.draw_contributions(d, traces),
         "fibres": fibres.draw_fibres(d),
-        "map": remains.draw_map(d),
+        "map": residual_map.draw_map(d),
         "laws": laws.draw_laws(d),
     }
 
@@ -43,7 +43,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         seen.append((touching(found), outside(made, found), [text for text, _ in found], 25.4 * made.get_figheight()))
         return ""
 
-    for module in (before_after, fibres, laws, parts, probabilities, remains):
+    for module in (before_after, contributions, fibres, laws, probabilities, residual_map):
         monkeypatch.setattr(module, "svg", looked_at)
     return seen
 
@@ -71,7 +71,7 @@ def test_what_is_left_out_is_said(drawn: list[Any]) -> None:
     figures = draw_all(many(40, 5, 30, 31))
     captions = {name: figure.caption for name, figure in figures.items() if figure}
     assert "14 of 31 candidates shown" in captions["probabilities"]
-    assert "3 of 200 trials shown" in captions["parts"]
+    assert "3 of 200 trials shown" in captions["contributions"]
     assert "12 of 40 fibres shown" in captions["fibres"]
     assert "10 of 31 candidates shown" in captions["fibres"]
     assert "36 of 200 trials shown" in captions["map"]
@@ -96,7 +96,7 @@ def test_where_the_answer_is_the_base_one_model_is_shown_and_that_is_said(drawn:
     written = {text for _, _, texts, _ in drawn for text in texts}
     assert "base model" in written
     assert "answer" not in written
-    for name in ("before_after", "parts"):
+    for name in ("before_after", "contributions"):
         figure = figures[name]
         assert figure is not None
         assert "to which the answer adds nothing" in figure.caption
@@ -113,7 +113,7 @@ def test_telling_trials_are_the_best_the_median_and_the_worst() -> None:
 def test_no_error_no_figure() -> None:
     d = one_fibre().diagnosis
     bare = replace(d, trials=(), map_before={}, map_after={}, components=(), base_law=None,
-                   remaining=replace(d.remaining, law=None))  # fmt: skip
+                   residual=replace(d.residual, law=None))  # fmt: skip
     assert set(draw_all(Sample(bare, ())).values()) == {None}
 
 
@@ -129,7 +129,7 @@ def test_every_number_may_be_unknown(drawn: list[Any]) -> None:
             for c in d.components
         ),
         by_fibre=tuple(replace(f, left_out_rmsd_f0=(nan, nan)) for f in d.by_fibre),
-        base_law=d.base_law and replace(d.base_law, time_constant_s=nan, weight_f0=(nan,) * 11, others={}),
+        base_law=d.base_law and replace(d.base_law, time_constant_s=nan, weight_f0=(nan,) * 11, other_scalings={}),
         benchmark_rmsd_f0=nan,
     )
     traces = tuple(replace(t, before_f0=np.full_like(t.before_f0, nan), without_f0={}) for t in traces)
@@ -190,3 +190,70 @@ def test_captions_have_no_mathematics(drawn: list[Any]) -> None:
         assert figure is not None
         assert "$" not in figure.caption
         assert figure.alternative
+
+
+# What every figure of `one_fibre` has: labels of its axes, and lines, bars or cells by axis.
+AXES = {
+    "before_after": {"Force (F$_0$)", "Residual\n(% F$_0$)", "Time (s)", "Held-out force RMSD (% F$_0$)"},
+    "probabilities": {"Inclusion probability", "Held-out gain (log RMSD ratio)"},
+    "contributions": {"Length\n(% L$_0$)", "Force (F$_0$)", "forcible detachment\n(% F$_0$)", "viscous drag\n(% F$_0$)",
+                      "force drift\n(% F$_0$)", "Residual\n(% F$_0$)", "Time (s)"},
+    "map": {"Mean of measured less model (% F$_0$)"},
+    "laws": {"Time constant of the exponential (s)", "Weight (% F$_0$)", "Explained fraction of the residual"},
+}  # fmt: skip
+
+
+@pytest.fixture
+def structure(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[dict[str, Any]]]:
+    """Labels and numbers of artists of every axis of the figures of one fibre, by figure."""
+    seen: list[Any] = []
+
+    def looked_at(made: Any) -> str:
+        seen.append(
+            [
+                {
+                    "labels": {axis.get_xlabel(), axis.get_ylabel()} - {""}, "lines": len(axis.get_lines()),
+                    "patches": len(axis.patches), "texts": len(axis.texts), "images": len(axis.get_images()),
+                    "collections": len(axis.collections),
+                }
+                for axis in made.get_axes()
+            ]
+        )  # fmt: skip
+        return ""
+
+    for module in (before_after, contributions, fibres, laws, probabilities, residual_map):
+        monkeypatch.setattr(module, "svg", looked_at)
+    names = [name for name, figure in draw_all(one_fibre()).items() if figure is not None]
+    return dict(zip(names, seen, strict=True))
+
+
+@pytest.mark.parametrize("name", AXES)
+def test_axes_say_what_they_show_and_in_which_unit(name: str, structure: dict[str, list[dict[str, Any]]]) -> None:
+    assert set().union(*(axis["labels"] for axis in structure[name])) == AXES[name]
+
+
+def test_figures_have_one_artist_for_each_thing_shown(structure: dict[str, list[dict[str, Any]]]) -> None:
+    d = one_fibre().diagnosis
+    # Three trials: measured, base and answer above; zero, base and answer below. Then one row for each trial and all.
+    forces, pairs = structure["before_after"][:6], structure["before_after"][6]
+    assert [axis["lines"] for axis in forces] == [3] * 6
+    rows = len(d.trials)
+    assert pairs["lines"] == 3 * (rows + 1) + rows + 1  # A bar with two dots in each row, noise, and the benchmark.
+    bars, gains = structure["probabilities"][:2]
+    assert (bars["patches"], bars["texts"]) == (len(d.components), len(d.components))
+    tried = sum(c.heldout_gain is not None for c in d.components)
+    assert gains["lines"] == 2 * tried + 1
+    parts = sum(1 for c in d.named)
+    columns = structure["contributions"]
+    assert len(columns) == 3 * (3 + parts)
+    assert [axis["lines"] for axis in columns[::3]] == [1, 3, 2, 2, 2, 3]
+    assert sum(axis["collections"] for axis in columns) == 3 * parts
+    (table,) = d.map_before.values()
+    maps = structure["map"][:2]
+    assert [axis["images"] for axis in maps] == [1, 1]
+    assert [axis["texts"] for axis in maps] == [len(list(table.cells()))] * 2
+    weights, shares = structure["laws"]
+    assert weights["collections"] == 2
+    # Both laws: as what they scale with, and as whatever else is known.
+    known = [law for law in (d.base_law, d.residual.law) if law is not None]
+    assert shares["lines"] == 2 * sum(1 + len(law.other_scalings) for law in known)

@@ -45,7 +45,7 @@ def test_headline_summary_and_table(name: str) -> None:
 def test_a_row_has_all_that_is_known_of_a_component() -> None:
     rows = table(terminal_text(one_fibre().diagnosis))
     assert rows[0].split() == [
-        "component", "probability", "share", "held-out", "gain", "±", "se", "parameter", "[95", "%]", "does",
+        "component", "probability", "ablation", "loss", "held-out", "gain", "±", "se", "parameter", "[95", "%]", "does",
     ]  # fmt: skip
     assert "> 0.99" in rows[2]
     assert "k 1040 1/s [870, 1230]" in rows[2]

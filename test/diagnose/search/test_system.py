@@ -11,7 +11,7 @@ from made_trials import given_fibre
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.search.system import BEYOND, System, label, ordered
 from xb_muscle_ros.fit.features import F0_ANCHOR
-from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS, ORDINARY
 from xb_muscle_ros.models.catalogue import CATALOGUE
 
 
@@ -36,7 +36,7 @@ def test_a_named_artefact_may_be_larger(name: Name, system: System) -> None:
     for c in system.problem((name,), {}).coordinates:
         if c.group is not None:
             wider = BEYOND if c.name == name.value else 1.0
-            assert c.prior_sd == pytest.approx(wider * FAULTS[c.name].sd), c.label
+            assert c.prior_sd == pytest.approx(wider * ARTEFACTS[c.name].sd), c.label
 
 
 @pytest.mark.parametrize("name", [Name.VISCOUS_DRAG, Name.ACTIVE_TITIN, Name.FORCIBLE_DETACHMENT])

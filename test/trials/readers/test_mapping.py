@@ -12,6 +12,7 @@ import pytest
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.activation import CalciumTransient
+from xb_muscle_ros.trials.readers.description import filled
 from xb_muscle_ros.trials.readers.mapping import BAG, build_mapping, load_mapping
 from xb_muscle_ros.trials.readers.units import Quantity
 
@@ -134,7 +135,8 @@ def test_activation_takes_pca_and_times() -> None:
 def test_names_may_come_from_file_and_folder() -> None:
     made = build_mapping({**TREE, "fibre": "{folder}", "trial": "{folder}_{file}"}, "here")
     file = Path("somewhere/rat7/cell_pca61.csv")
-    assert (made.fibre_of(file), made.trial_of(file), made.data_set_of(file)) == ("rat7", "rat7_cell_pca61", "rat7")
+    names = [filled(name, file) for name in (made.fibre, made.trial, made.data_set)]
+    assert names == ["rat7", "rat7_cell_pca61", "rat7"]
 
 
 def test_signals_of_a_bag_are_topics() -> None:

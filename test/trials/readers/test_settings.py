@@ -42,13 +42,14 @@ def test_keys_per_file_go_over_those_for_all(
     mapping = ImportSettings(TREE, "here").prepare(_file(tmp_path, f"{name}.csv")).mapping
     assert mapping.f0 is not None
     assert mapping.force is not None
-    assert (mapping.fibre, mapping.f0.value, mapping.pca, mapping.force.unit_name) == (fibre, f0_n, pca, unit)
+    assert (mapping.fibre, mapping.f0.value, mapping.force.unit_name) == (fibre, f0_n, unit)
+    assert mapping.facts.get("pca") == pca
 
 
 def test_options_go_over_keys_per_file_and_null_takes_a_key_out(tmp_path: Path) -> None:
     settings = ImportSettings({**TREE, "per_file": [{"files": ".", "pca": None}]}, "here", overrides={"fibre": "f3"})
     mapping = settings.prepare(_file(tmp_path)).mapping
-    assert (mapping.fibre, mapping.pca) == ("f3", None)
+    assert (mapping.fibre, mapping.facts.get("pca")) == ("f3", None)
 
 
 @pytest.mark.parametrize(

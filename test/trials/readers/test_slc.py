@@ -10,7 +10,7 @@ import pytest
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.assembly import trial_of
 from xb_muscle_ros.trials.readers.settings import ImportSettings
-from xb_muscle_ros.trials.readers.slc_file import read_columns, read_header
+from xb_muscle_ros.trials.readers.slc import read_columns, read_header
 from xb_muscle_ros.trials.trial import Trial
 
 RATE_HZ = 2500

@@ -51,8 +51,8 @@ def test_what_spreadsheets_write_is_read_and_told(tmp_path: Path, data: bytes, w
     table = read_table(tmp_path / "t.csv")
     assert table.numbers("a").tolist() == [1.0, 3.0]
     assert table.numbers("b").tolist() == [2.0, 4.0]
-    assert len(table.told) == len(words)
-    assert all(word in told for word, told in zip(words, table.told, strict=True))
+    assert len(table.notices) == len(words)
+    assert all(word in told for word, told in zip(words, table.notices, strict=True))
 
 
 def test_the_two_signs_for_micro_are_one(tmp_path: Path) -> None:

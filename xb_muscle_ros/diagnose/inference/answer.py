@@ -26,7 +26,8 @@ from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import Names, ordered
 from xb_muscle_ros.fit.coordinates import Coordinate
-from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS as ARTEFACTS_BY_NAME
+from xb_muscle_ros.measurement.artefacts import ORDINARY
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.parameters import PARAMETERS
 
@@ -130,7 +131,7 @@ def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Compon
         OfFibre(
             fibre=system.fibre.name,
             inclusion_probability=judged.probability(group, i),
-            share_of_mismatch=unique(e, chosen, without, judged.noise_f0, i) if own is not None else 0.0,
+            ablation_loss=unique(e, chosen, without, judged.noise_f0, i) if own is not None else 0.0,
             heldout_gain=judged.heldout.gain(chosen, without, i) if own is not None else None,
             parameters=() if best is None else _of_one(judged, best, lead, i),
             replication=judged.replication(group, i),
@@ -143,7 +144,7 @@ def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Compon
         family=FAMILY[lead],
         members=tuple(n.value for n in sorted(group, key=lambda n: (n is not lead, -judged.averages.including([n])))),
         inclusion_probability=probability,
-        share_of_mismatch=share,
+        ablation_loss=share,
         heldout_gain=gain,
         parameters=() if best is None else _of_all(judged, best, lead),
         not_separable_from=tuple(n.value for n in rivals),
@@ -200,7 +201,7 @@ def _of_all(judged: Judged, names: Names, name: Name) -> tuple[Parameter, ...]:
 
 
 def _unit(c: Coordinate) -> str:
-    return FAULTS[c.name].unit if c.group is not None else PARAMETERS[c.name].unit
+    return ARTEFACTS_BY_NAME[c.name].unit if c.group is not None else PARAMETERS[c.name].unit
 
 
 def _at_bound(c: Coordinate, z: float) -> bool:

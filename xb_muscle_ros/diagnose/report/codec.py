@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from xb_muscle_ros.diagnose.report.older_formats import READ, renamed
 from xb_muscle_ros.diagnose.result import FORMAT, Diagnosis
 from xb_muscle_ros.errors import UserError
 
@@ -46,8 +47,11 @@ def from_json(row: object, where: str = "diagnosis.json") -> Diagnosis:
     version = row.get("format_version")
     if version is None and "version" in row:
         raise UserError(f"{where} was made by an older version (format {row['version']}); {_AGAIN}")
-    if version != FORMAT:
-        raise UserError(f"{where}: format_version is {version!r}, this version reads {FORMAT}; {_AGAIN}")
+    if version in READ:
+        row = {**renamed(row, version), "format_version": FORMAT}
+    elif version != FORMAT:
+        known = " and ".join(map(str, (*READ, FORMAT)))
+        raise UserError(f"{where}: format_version is {version!r}, this version reads {known}; {_AGAIN}")
     return _record(Diagnosis, row, where)
 
 
@@ -85,54 +89,41 @@ def _record(kind: type[T], row: object, where: str) -> T:
 def _decoded(hint: Any, value: object, where: str) -> object:
     """A value as its type hint wants it."""
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
-    if hint is object:
-        return value
     if origin in (types.UnionType, typing.Union):
         (kind,) = (k for k in inner if k is not type(None))
         return None if value is None else _decoded(kind, value, where)
     if origin is tuple:
         return _tuple(inner, value, where)
-    if origin is list:
-        return [_decoded(inner[0], one, f"{where}[{k}]") for k, one in enumerate(_listed(value, where))]
     if origin is dict:
         if not isinstance(value, Mapping):
             raise _wrong(where, value, "an object")
         return {str(key): _decoded(inner[1], one, f"{where}.{key}") for key, one in value.items()}
     if dataclasses.is_dataclass(hint) and isinstance(hint, type):
         return _record(hint, value, where)
-    if isinstance(hint, type) and issubclass(hint, enum.Enum):
+    if issubclass(hint, enum.Enum):
         try:
             return hint(value)
         except ValueError as error:
             raise _wrong(where, value, "one of " + ", ".join(str(member.value) for member in hint)) from error
-    return _single(hint, value, where)
+    if hint is float and value is None:
+        return math.nan
+    if not isinstance(value, _ACCEPTED[hint]) or (isinstance(value, bool) and hint is not bool):
+        raise _wrong(where, value, _WANTED[hint])
+    return hint(value)
 
 
-def _single(kind: type, value: object, where: str) -> object:
-    if kind is float:
-        if value is None:
-            return math.nan
-        if isinstance(value, (int, float)) and not isinstance(value, bool):
-            return float(value)
-        raise _wrong(where, value, "a number")
-    if not isinstance(value, kind) or (kind is int and isinstance(value, bool)):
-        raise _wrong(where, value, {str: "text", int: "a whole number", bool: "true or false"}[kind])
-    return value
+_ACCEPTED: dict[type, tuple[type, ...]] = {float: (int, float), str: (str,), int: (int,), bool: (bool,)}
+_WANTED = {float: "a number", str: "text", int: "a whole number", bool: "true or false"}
 
 
 def _tuple(inner: tuple[Any, ...], value: object, where: str) -> tuple[object, ...]:
-    listed = _listed(value, where)
-    if inner[-1] is Ellipsis:
-        inner = (inner[0],) * len(listed)
-    if len(listed) != len(inner):
-        raise _wrong(where, value, f"a list of {len(inner)}")
-    return tuple(_decoded(k, one, f"{where}[{i}]") for i, (k, one) in enumerate(zip(inner, listed, strict=True)))
-
-
-def _listed(value: object, where: str) -> list[object]:
     if not isinstance(value, list):
         raise _wrong(where, value, "a list")
-    return value
+    if inner[-1] is Ellipsis:
+        inner = (inner[0],) * len(value)
+    if len(value) != len(inner):
+        raise _wrong(where, value, f"a list of {len(inner)}")
+    return tuple(_decoded(k, one, f"{where}[{i}]") for i, (k, one) in enumerate(zip(inner, value, strict=True)))
 
 
 def _wrong(where: str, value: object, wanted: str) -> UserError:

@@ -7,19 +7,20 @@ import functools
 import re
 from collections.abc import Sequence
 from importlib import resources
-from typing import Any, NamedTuple
+from typing import Any
 
 import jinja2
 from jinja2.filters import do_forceescape, do_mark_safe
 
 from xb_muscle_ros.diagnose.component import NAMED
+from xb_muscle_ros.diagnose.report import figures
 from xb_muscle_ros.diagnose.report import phrases as say
-from xb_muscle_ros.diagnose.report.figures.common import Figure, trial_labels
+from xb_muscle_ros.diagnose.report.figures.common import trial_labels
 from xb_muscle_ros.diagnose.report.glossary import GLOSSARY
 from xb_muscle_ros.diagnose.report.prose import headline, summary
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
-from xb_muscle_ros.diagnose.result import Diagnosis, Nuisance
-from xb_muscle_ros.diagnose.words import digits, family_words, human, joined, meaning, phase_words
+from xb_muscle_ros.diagnose.result import Diagnosis, NuisanceParameter
+from xb_muscle_ros.diagnose.words import family_words, human, joined, meaning, phase_words
 
 _HERE = "xb_muscle_ros.diagnose.report"
 _UNITS = re.compile(r"\b([FL])0\b")
@@ -31,20 +32,6 @@ MOST_ROWS = 40
 """Rows of a table of trials, errors or places; the rest is in `diagnosis.json`, and said to be."""
 # Candidates below this probability are listed in one line.
 _LEAST = 0.05
-
-
-class Shown(NamedTuple):
-    """A figure in its place on the page.
-
-    Attributes:
-        number: from 1 on.
-        source: data URI.
-        figure: with its caption.
-    """
-
-    number: int
-    source: str
-    figure: Figure
 
 
 def as_html(d: Diagnosis, traces: Sequence[TrialTraces]) -> str:
@@ -83,7 +70,7 @@ def _environment() -> jinja2.Environment:
     made.filters.update(
         f0=lambda value: say.force(value, ""), prob=say.probability, share=say.share, gain=say.gain, num=say.number,
         estimate=say.estimate, title=say.title, human=human, meaning=meaning, family=family_words, phase=phase_words,
-        units=_units, joined=joined, signed=_signed, p=_p_value, rounded=say.rounded, error=say.error,
+        units=_units, joined=joined, signed=say.signed, error=say.error,
     )  # fmt: skip
     return made
 
@@ -99,9 +86,11 @@ def _context(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Any]:
         "style": do_mark_safe(source("report.css")),
         "likely": likely,
         "unlikely": [c for c in d.components if c not in likely],
-        "nuisances": sorted(d.nuisances, key=lambda n: -_beyond(n)),
+        "nuisances": sorted(d.nuisance_parameters, key=lambda n: -_beyond(n)),
         "beyond": _beyond,
         "labels": {f"{fibre}\n{trial}": text for (fibre, trial), text in trial_labels(d).items()},
+        "p": lambda value, fibres=1: say.p_value(value, fibres * d.p_value_floor),
+        "called": lambda names: [say.called(d, name) for name in names],
         "named": NAMED,
         "most": MOST_ROWS,
         "several": len(d.fibres) > 1,
@@ -110,26 +99,18 @@ def _context(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Any]:
     }
 
 
-def _figures(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Shown]:
-    """Figures that there are, numbered in the order of the page."""
-    # Matplotlib takes long to load, and a diagnosis that fails early needs none of it.
-    from xb_muscle_ros.diagnose.report.figures.before_after import draw_before_after
-    from xb_muscle_ros.diagnose.report.figures.fibres import draw_fibres
-    from xb_muscle_ros.diagnose.report.figures.laws import draw_laws
-    from xb_muscle_ros.diagnose.report.figures.parts import draw_parts
-    from xb_muscle_ros.diagnose.report.figures.probabilities import draw_probabilities
-    from xb_muscle_ros.diagnose.report.figures.remains import draw_map
-
+def _figures(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Any]:
+    """Figures that there are with their numbers, from 1 on in the order of the page, and data URIs."""
     drawn = {
-        "before_after": draw_before_after(d, traces),
-        "probabilities": draw_probabilities(d),
-        "parts": draw_parts(d, traces),
-        "fibres": draw_fibres(d),
-        "map": draw_map(d),
-        "laws": draw_laws(d),
+        "before_after": figures.draw_before_after(d, traces),
+        "probabilities": figures.draw_probabilities(d),
+        "contributions": figures.draw_contributions(d, traces),
+        "fibres": figures.draw_fibres(d),
+        "map": figures.draw_map(d),
+        "laws": figures.draw_laws(d),
     }
-    there = {name: figure for name, figure in drawn.items() if figure is not None}
-    return {name: Shown(k, _uri(figure.svg), figure) for k, (name, figure) in enumerate(there.items(), start=1)}
+    there = [(name, figure) for name, figure in drawn.items() if figure is not None]
+    return {name: {"number": k, "source": _uri(f.svg), "figure": f} for k, (name, f) in enumerate(there, start=1)}
 
 
 def _uri(svg: str) -> str:
@@ -148,20 +129,11 @@ def _printable(value: object) -> object:
 
 def _units(text: object) -> str:
     """Words of the tool's own, with F0 and L0 as physiologists print them."""
-    told = _TIED.sub("\u00a0", str(do_forceescape(str(_printable(str(text))))))
-    return do_mark_safe(_UNITS.sub(r"\1<sub>0</sub>", told))
+    escaped = str(do_forceescape(str(_printable(str(text)))))
+    return do_mark_safe(_UNITS.sub(r"\1<sub>0</sub>", _TIED.sub("\u00a0", escaped)))
 
 
-def _signed(value_f0: float) -> str:
-    text = say.force(value_f0, "")
-    return f"+{text}" if value_f0 > 0.0 and text != say.NOTHING else text
-
-
-def _p_value(value: float) -> str:
-    return "< 0.001" if 0.0 <= value < 0.001 else digits(value) if value == value else say.NOTHING
-
-
-def _beyond(n: Nuisance) -> float:
-    """Size of an ordinary error against what is ordinary."""
+def _beyond(n: NuisanceParameter) -> float:
+    """Size of an ordinary artefact in its prior SDs."""
     ratio = abs(n.value) / n.prior_sd if n.prior_sd > 0.0 else 0.0
     return ratio if ratio == ratio else 0.0

@@ -6,8 +6,9 @@ import math
 from collections.abc import Iterable, Sequence
 
 from xb_muscle_ros.diagnose.component import NAMED, Component, HeldOutGain, Kind, Parameter
-from xb_muscle_ros.diagnose.result import Diagnosis, Nuisance, Place
-from xb_muscle_ros.diagnose.words import digits, family_words, human, joined, phase_words, quantity
+from xb_muscle_ros.diagnose.residual import Place
+from xb_muscle_ros.diagnose.result import Diagnosis, NuisanceParameter
+from xb_muscle_ros.diagnose.words import after_number, digits, family_words, human, joined, phase_words, quantity
 
 NOTHING = "–"
 """Where a number is unknown."""
@@ -57,47 +58,50 @@ def force(value_f0: float | None, unit: str = " % F0") -> str:
     return digits(100.0 * value_f0).replace("-", _MINUS) + unit
 
 
-def signed(value: float, decimals: int = 2) -> str:
-    """A number with its sign; zero without one."""
+def signed(value_f0: float) -> str:
+    """A force in % F0 with its sign, without the unit."""
+    text = force(value_f0, "")
+    return f"+{text}" if value_f0 > 0.0 and text != NOTHING else text
+
+
+def p_value(value: float, floor: float = 0.0) -> str:
+    """A p-value; at the floor of the bootstrap it may be any smaller one."""
     if not math.isfinite(value):
         return NOTHING
-    text = f"{value:+.{decimals}f}"
-    return text.replace("-", _MINUS) if float(text) else f"{0.0:.{decimals}f}"
+    if value <= floor * (1.0 + 1e-9):
+        return f"≤ {digits(value)}"
+    return "< 0.001" if 0.0 <= value < 0.001 else digits(value)
 
 
 def gain(g: HeldOutGain | None) -> str:
     """``+0.16 ± 0.05``."""
     if g is None or not math.isfinite(g.mean):
         return NOTHING
-    return signed(g.mean) + (f" ± {g.se:.2f}" if math.isfinite(g.se) else "")
+    # Zero has no sign.
+    mean = f"{g.mean:+.2f}".replace("-", _MINUS) if round(g.mean, 2) else "0.00"
+    return mean + (f" ± {g.se:.2f}" if math.isfinite(g.se) else "")
 
 
-def number(value: float, unit: str | None = None) -> str:
+def number(value: float, unit: str | None = None, significant: int = 3) -> str:
     """A value of three digits with its unit."""
-    return quantity(value, unit).replace("-", _MINUS, 1) if math.isfinite(value) else NOTHING
+    return quantity(value, unit, significant).replace("-", _MINUS, 1) if math.isfinite(value) else NOTHING
 
 
-def rounded(value: float, significant: int = 2) -> str:
-    """A number of so many digits, without unit."""
-    return digits(value, significant).replace("-", _MINUS, 1) if math.isfinite(value) else NOTHING
-
-
-def error(n: Nuisance) -> tuple[str, str]:
-    """An ordinary error with its standard error, and what is ordinary; short times in ms."""
+def error(n: NuisanceParameter) -> tuple[str, str]:
+    """An ordinary artefact with its standard error, and what is ordinary; short times in ms."""
     scale, unit = (1e3, "ms") if n.unit == "s" and abs(n.prior_sd) < 0.1 else (1.0, n.unit)
-    told = "" if unit in ("", "1") else f" {unit}"
-    sd = "" if n.sd is None else f" ± {rounded(scale * n.sd)}"
-    return f"{rounded(scale * n.value)}{sd}{told}", f"± {rounded(scale * n.prior_sd)}{told}"
+    value, prior = number(scale * n.value, significant=2), number(scale * n.prior_sd, unit, 2)
+    sd = "" if n.sd is None else f" ± {number(scale * n.sd, significant=2)}"
+    return f"{value}{sd}{after_number(unit)}", f"± {prior}"
 
 
 def estimate(p: Parameter) -> str:
     """Value, unit and interval, in one line."""
     if not math.isfinite(p.value):
         return NOTHING
-    unit = "" if p.unit in ("", "1") else f" {p.unit}"
     low, high = p.interval
     known = math.isfinite(low) and math.isfinite(high)
-    return number(p.value) + unit + (f" [{number(low)}, {number(high)}]" if known else "")
+    return number(p.value, p.unit) + (f" [{number(low)}, {number(high)}]" if known else "")
 
 
 def title(c: Component) -> str:
@@ -110,7 +114,7 @@ def title(c: Component) -> str:
 
 
 def called(d: Diagnosis, name: str) -> str:
-    """A name that refers to a component, as a sentence calls it."""
+    """A component by its name, as a sentence calls it."""
     found = next((c for c in d.components if c.name == name), None)
     return human(name) if found is None else title(found)
 
@@ -127,8 +131,8 @@ def artefacts(components: Iterable[Component]) -> list[Component]:
 
 def replicated(c: Component) -> tuple[int, int]:
     """In how many fibres a component that the other fibres show is found again, and of how many."""
-    told = [row for row in c.by_fibre if row.replication is not None]
-    return sum(row.replicates for row in told), len(told)
+    known = [row for row in c.by_fibre if row.replication is not None]
+    return sum(row.replicates for row in known), len(known)
 
 
 def replicated_by(d: Diagnosis, fibre: str) -> list[str]:

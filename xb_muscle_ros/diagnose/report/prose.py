@@ -9,7 +9,8 @@ import math
 
 from xb_muscle_ros.diagnose.component import NAMED, SURE, Component
 from xb_muscle_ros.diagnose.report import phrases as say
-from xb_muscle_ros.diagnose.result import Diagnosis, Law, Verdict
+from xb_muscle_ros.diagnose.residual import ResidualLaw
+from xb_muscle_ros.diagnose.result import Diagnosis, Verdict
 from xb_muscle_ros.diagnose.words import SCALES, chance, human, joined, quantity
 
 MOST = 6
@@ -17,31 +18,35 @@ MOST = 6
 _MOST_CAUSES, _MOST_CHANGES = 4, 3
 # Parameters that moved less than this share are not worth a word.
 _CHANGED = 0.02
-_HIGHER = {1: "higher than", -1: "lower than", 0: "now higher, now lower than"}
+_HIGHER = {1: "higher than", -1: "lower than", 0: "by turns higher and lower than"}
 _UNJUDGED = "the model does not describe these recordings, or noise hides what is looked for"
 
 
 def headline(d: Diagnosis) -> str:
     """The diagnosis in one line."""
-    found, errors = say.mechanisms(d.named), say.artefacts(d.named)
+    found, artefacts = say.mechanisms(d.named), say.artefacts(d.named)
+    word = d.verdict.value.capitalize()
     if not d.described:
         return f"Not judged: {_UNJUDGED}"
     if d.verdict is Verdict.PHYSICS and found:
         many = "explain" if len(d.named) > 1 else "explains"
-        names = joined([say.title(c) for c in [*found, *errors]])
-        return f"Physics: {names} {many} {_explained(d)} of the mismatch; {say.force(d.remaining.rmsd_f0)} remain"
-    if d.verdict is Verdict.MEASUREMENT and errors:
-        return f"Measurement: {joined([say.title(c) for c in errors])} beyond what is ordinary"
-    if d.verdict is Verdict.AMBIGUOUS and found:
-        return f"Ambiguous: evidence for {joined([_with_probability(c) for c in found])}; {_unsure(found)}"
-    if d.verdict is Verdict.NONE and not d.named:
-        return "None: the model as given is as good as these recordings can tell"
-    if d.verdict is Verdict.PARAMETERS and not d.named:
-        return "Parameters: other values of the same parameters are enough"
-    word = d.verdict.value.capitalize()
+        names = joined([say.title(c) for c in [*found, *artefacts]])
+        return f"{word}: {names} {many} {_explained(d)} of the mismatch; {say.force(d.residual.rmsd_f0)} remain"
+    if d.verdict is Verdict.MEASUREMENT and artefacts:
+        return f"{word}: {joined([say.title(c) for c in artefacts])} beyond what is ordinary"
     if d.named:
-        return f"{word}: evidence for {joined([_with_probability(c) for c in d.named])}"
-    return f"{word}: {say.force(d.before.train_rmsd_f0)} differ, and no candidate reaches a probability of {NAMED:g}"
+        unsure = f"; {_unsure(found)}" if d.verdict is Verdict.AMBIGUOUS and found else ""
+        return f"{word}: evidence for {joined([_with_probability(c) for c in (found if unsure else d.named)])}{unsure}"
+    if d.verdict is Verdict.NONE:
+        return f"{word}: these recordings do not call for another model"
+    if d.verdict is Verdict.PARAMETERS:
+        return f"{word}: other values of the same parameters are enough"
+    return f"{word}: the base model differs by {say.force(d.before.train_rmsd_f0)}; {_none_of(d)} explains it"
+
+
+def _none_of(d: Diagnosis) -> str:
+    count = len(d.components)
+    return f"none of the {count} candidates" if count > 1 else "no candidate"
 
 
 def _with_probability(c: Component) -> str:
@@ -51,49 +56,35 @@ def _with_probability(c: Component) -> str:
 def summary(d: Diagnosis) -> tuple[str, ...]:
     """At most `MOST` sentences."""
     if not d.described:
-        told = [_difference(d), *_where(d), f"Nothing is named: {_UNJUDGED}.", *_chance(d), *_missing(d)]
+        lines = [_difference(d), *_where(d), f"Nothing is named: {_UNJUDGED}.", *_chance(d), *_missing(d)]
     elif d.named:
-        told = _with_causes(d)
+        lines = _with_causes(d)
     elif d.verdict in (Verdict.NONE, Verdict.PARAMETERS):
-        told = [_followed(d), *_enough(d), *_chance(d), _best(d), *(_missing(d) or [_nothing_next(d)])]
+        lines = [_difference(d, "follows"), *_enough(d), *_chance(d), _best(d), *(_missing(d) or [_nothing_next(d)])]
     else:
-        told = [_difference(d), *_where(d), _best(d), *_law(d.remaining.law or d.base_law), *_next(d)]
-    return tuple(told)
+        lines = [_difference(d), *_where(d), _best(d), *_law(d.residual.law or d.base_law), *_next(d)]
+    return tuple(lines)
 
 
 def _with_causes(d: Diagnosis) -> list[str]:
-    causes, errors, after = _causes(d), _artefacts(d), _next(d)
-    before = [_difference(d), *_where(d), *causes, *errors]
+    after = _next(d)
+    before = [_difference(d), *_where(d), *_causes(d), *_artefacts(d)]
     effect, remains = _effect(d), _remains(d)
     if len(before) + len(after) + 2 > MOST:
         return [*before, f"{effect}; {remains[0].lower()}{remains[1:]}.", *after]
-    law = _law(d.remaining.law) if len(before) + len(after) + 3 <= MOST else []
+    law = _law(d.residual.law) if len(before) + len(after) + 3 <= MOST else []
     return [*before, f"{effect}.", f"{remains}.", *law, *after]
 
 
-def _noise(d: Diagnosis) -> str:
-    known = math.isfinite(d.remaining.noise_f0)
-    return f"; their noise is {say.force(d.remaining.noise_f0)}" if known else ""
-
-
-def _difference(d: Diagnosis) -> str:
-    return (
-        f"Fitted with ordinary measurement error{_tabulated(d)}, the base model {d.model} differs from the recordings "
-        f"of {say.fibres(d)} by {say.force(d.before.train_rmsd_f0)}{_noise(d)}."
-    )
-
-
-def _followed(d: Diagnosis) -> str:
-    return (
-        f"Fitted with ordinary measurement error{_tabulated(d)}, the model {d.model} follows the recordings of "
-        f"{say.fibres(d)} to within {say.force(d.before.train_rmsd_f0)}{_noise(d)}."
-    )
-
-
-def _tabulated(d: Diagnosis) -> str:
-    """What the fit had to meet beside the traces."""
+def _difference(d: Diagnosis, verb: str = "differs from") -> str:
     count = sum(f.used for f in d.features)
-    return f" and {count} tabulated features" if count else ""
+    tables = f" and {count} tabulated feature{'s' if count > 1 else ''}" if count else ""
+    base, by = ("base model", "by") if verb == "differs from" else ("model", "to within")
+    noise = f"; their noise is {say.force(d.residual.noise_f0)}" if math.isfinite(d.residual.noise_f0) else ""
+    return (
+        f"The {base} {d.model}, fitted with ordinary measurement artefacts{tables}, {verb} the recordings of "
+        f"{say.fibres(d)} {by} {say.force(d.before.train_rmsd_f0)}{noise}."
+    )
 
 
 def _where(d: Diagnosis) -> list[str]:
@@ -148,7 +139,7 @@ def _unsure(found: list[Component]) -> str:
 
 def _artefacts(d: Diagnosis) -> list[str]:
     found = say.artefacts(d.named)
-    return [f"{_listed(d, found, 'beyond ordinary measurement error')}."] if found else []
+    return [f"{_listed(d, found, 'a measurement artefact beyond the ordinary')}."] if found else []
 
 
 def _best(d: Diagnosis) -> str:
@@ -162,7 +153,7 @@ def _best(d: Diagnosis) -> str:
 
 
 def _explained(d: Diagnosis) -> str:
-    text = say.share(d.explained_share)
+    text = say.share(d.explained_fraction)
     known = {"0 %": "none", "100 %": "all", say.NOTHING: "an unknown share"}
     return known.get(text, text.replace("< ", "less than ").replace("> ", "more than "))
 
@@ -181,25 +172,25 @@ def _effect(d: Diagnosis) -> str:
 
 
 def _remains(d: Diagnosis) -> str:
-    places = d.remaining.where
-    out = f"{'They leave' if len(d.named) > 1 else 'It leaves'} {say.force(d.remaining.rmsd_f0)}"
+    places = d.residual.places
+    out = f"{'They leave' if len(d.named) > 1 else 'It leaves'} {say.force(d.residual.rmsd_f0)}"
     return f"{out}, most in the {say.where(d, places)}" if places else f"{out}, and no place stands out"
 
 
-def _law(law: Law | None) -> list[str]:
+def _law(law: ResidualLaw | None) -> list[str]:
     if law is None or not math.isfinite(law.time_constant_s):
         return []
     scales = f" and {SCALES[law.scales_with]}" if law.scales_with in SCALES else ""
     constant = quantity(1e3 * law.time_constant_s, "ms")
     return [
-        f"The residual fades after stretch with a time constant of {constant}{scales}; this describes "
-        f"{say.share(law.explained)} of it and explains nothing."
+        f"The residual decays after a stretch with a time constant of {constant}{scales}. This describes "
+        f"{say.share(law.explained_fraction)} of it and does not explain it."
     ]
 
 
 def _enough(d: Diagnosis) -> list[str]:
     if d.verdict is Verdict.NONE:
-        return ["The fibre file as given is as good as these recordings can tell."]
+        return ["The fibre file as given does as well as the refitted model."]
     moved = []
     for row in d.by_fibre:
         for name, start, fitted, unit in row.base_parameters:
@@ -240,4 +231,4 @@ def _next(d: Diagnosis) -> list[str]:
         return _missing(d)
     if d.named:
         return ["Next: test the augmented fibre on recordings that this study did not have."]
-    return ["Next: look at what remains; no candidate describes it."]
+    return [f"Next: look at the residual; {_none_of(d)} explains it."]

@@ -9,7 +9,7 @@ from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.prose import headline, summary
 from xb_muscle_ros.diagnose.result import Diagnosis
 
-_HEAD = ("component", "probability", "share", "held-out gain ± se", "parameter [95 %]", "does")
+_HEAD = ("component", "probability", "ablation loss", "held-out gain ± se", "parameter [95 %]", "does")
 _RIGHT = (1, 2)
 _MOST_ROWS, _NAME = 8, 38
 # Less probable ones are only counted, unless there is nothing else.
@@ -21,11 +21,10 @@ def terminal_text(d: Diagnosis, width: int = 100) -> str:
     lines = [*_wrapped(headline(d), width), "", *_wrapped(" ".join(summary(d)), width)]
     if d.components:
         lines += ["", *_table(d)]
-    for name, told in (("warning", d.warnings), ("missing", d.missing), ("note", d.notes)):
-        if told:
-            lines.append("")
-        for line in told:
-            lines += _wrapped(f"{name}: {line}", width, "  ")
+    for name, rows in (("warning", d.warnings), ("missing", d.missing), ("note", d.notes)):
+        lines += [""] if rows else []
+        for row in rows:
+            lines += _wrapped(f"{name}: {row}", width, "  ")
     return "\n".join(lines)
 
 
@@ -53,16 +52,16 @@ def _table(d: Diagnosis) -> list[str]:
 
 def _share(c: Component) -> str:
     """Nothing was taken out where it is not part of the answer."""
-    return say.share(c.share_of_mismatch) if c.inclusion_probability >= NAMED else say.NOTHING
+    return say.share(c.ablation_loss) if c.inclusion_probability >= NAMED else say.NOTHING
 
 
 def _rows(c: Component) -> list[tuple[str, ...]]:
     """A line for a component, and one for each further line of its name or further parameter."""
     names = _wrapped(say.title(c) + (" (artefact)" if c.kind is Kind.ARTEFACT else ""), _NAME)
-    told = [f"{p.name} {say.estimate(p)}{' at bound' if p.at_bound else ''}" for p in c.parameters]
+    values = [f"{p.name} {say.estimate(p)}{' at bound' if p.at_bound else ''}" for p in c.parameters]
     first = (say.probability(c.inclusion_probability), _share(c), say.gain(c.heldout_gain))
     out: list[tuple[str, ...]] = []
-    for k in range(max(len(names), len(told), 1)):
-        name, parameter = (names[k] if k < len(names) else ""), (told[k] if k < len(told) else "")
+    for k in range(max(len(names), len(values), 1)):
+        name, parameter = (names[k] if k < len(names) else ""), (values[k] if k < len(values) else "")
         out.append((name, *(first if k == 0 else ("", "", "")), parameter, c.direction if k == 0 else ""))
     return out

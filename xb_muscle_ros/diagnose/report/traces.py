@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +17,6 @@ from xb_muscle_ros.files import replaced
 
 Array = npt.NDArray[np.float64]
 
-_SIGNALS = (
-    "length_l0", "measured_f0", "start_f0", "before_f0", "after_f0", "heldout_before_f0", "heldout_after_f0",
-)  # fmt: skip
-_OPTIONAL = ("heldout_before_f0", "heldout_after_f0")
 _WITHOUT = "without_"
 _AGAIN = "run xb_muscle diagnose again"
 
@@ -56,21 +52,25 @@ class TrialTraces:
 
     def __post_init__(self) -> None:
         """Refuse signals of another length than the time's."""
-        for name, values in self._signals().items():
+        for name, values in self.signals().items():
             if values.shape != self.time_s.shape or self.time_s.ndim != 1:
                 raise UserError(
                     f"trial {self.trial}: {name} has shape {values.shape}, its time {self.time_s.shape}; "
                     "give one value for each sample"
                 )
 
-    def _signals(self) -> dict[str, Array]:
-        known = {name: getattr(self, name) for name in _SIGNALS}
-        extra = {f"{_WITHOUT}{name}_f0": values for name, values in self.without_f0.items()}
-        return {name: values for name, values in {**known, **extra}.items() if values is not None}
+    def signals(self) -> dict[str, Array]:
+        """All arrays that there are by the names that they have in the file."""
+        own = {name: getattr(self, name) for name in _REQUIRED if getattr(self, name) is not None}
+        return own | {f"{_WITHOUT}{name}_f0": values for name, values in self.without_f0.items()}
 
     def adds_f0(self, name: str) -> Array:
         """What a component adds to the force: the answer's less that without it, F0, shape (n,)."""
         return self.after_f0 - self.without_f0[name]
+
+
+_REQUIRED = {f.name: f.default is MISSING for f in fields(TrialTraces) if str(f.type).startswith("Array")}
+"""Whether a trial has to have it, by signal."""
 
 
 def write_traces(path: Path, traces: Sequence[TrialTraces]) -> None:
@@ -82,8 +82,7 @@ def write_traces(path: Path, traces: Sequence[TrialTraces]) -> None:
     names = json.dumps([{"fibre": t.fibre, "trial": t.trial} for t in traces])
     arrays: dict[str, Any] = {"names": np.array(names)}
     for i, trial in enumerate(traces):
-        arrays[f"t{i}_time_s"] = trial.time_s
-        arrays |= {f"t{i}_{name}": np.asarray(values, dtype=np.float64) for name, values in trial._signals().items()}
+        arrays |= {f"t{i}_{name}": np.asarray(values, dtype=np.float64) for name, values in trial.signals().items()}
     with replaced(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)
 
@@ -107,7 +106,7 @@ def read_traces(path: Path) -> tuple[TrialTraces, ...]:
 def _trial(file: Any, i: int, fibre: str, trial: str, path: Path) -> TrialTraces:
     head = f"t{i}_"
     found = {name.removeprefix(head): name for name in file.files if name.startswith(head)}
-    missing = [name for name in ("time_s", *_SIGNALS) if name not in found and name not in _OPTIONAL]
+    missing = [name for name, required in _REQUIRED.items() if required and name not in found]
     if missing:
         raise UserError(f"{path} has no {head}{missing[0]} (trial {trial}); {_AGAIN}")
     without = {
@@ -115,5 +114,5 @@ def _trial(file: Any, i: int, fibre: str, trial: str, path: Path) -> TrialTraces
         for name, key in found.items()
         if name.startswith(_WITHOUT)
     }
-    known = {name: file[key] for name, key in found.items() if name in ("time_s", *_SIGNALS)}
+    known = {name: file[key] for name, key in found.items() if name in _REQUIRED}
     return TrialTraces(fibre=fibre, trial=trial, without_f0=without, **known)

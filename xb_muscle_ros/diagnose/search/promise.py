@@ -13,7 +13,7 @@ from xb_muscle_ros.diagnose.search.descent import Descent, Fit
 from xb_muscle_ros.diagnose.search.system import BEYOND, System
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.training import Training
-from xb_muscle_ros.measurement.faults import ORDINARY
+from xb_muscle_ros.measurement.artefacts import ORDINARY
 from xb_muscle_ros.models.catalogue import CATALOGUE
 
 Array = npt.NDArray[np.float64]

@@ -18,7 +18,7 @@ from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.fit.features import F0_ANCHOR, Feature
 from xb_muscle_ros.fit.problem import Problem
-from xb_muscle_ros.measurement.faults import FAULTS, ORDINARY
+from xb_muscle_ros.measurement.artefacts import ARTEFACTS, ORDINARY
 from xb_muscle_ros.mechanisms import Entry
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.fibre_file import Fibre
@@ -125,12 +125,12 @@ class System:
 
     def error_sd(self, name: str) -> float:
         """Standard deviation of an ordinary measurement error, in its unit."""
-        return self.error_sds.get(name, FAULTS[name].sd)
+        return self.error_sds.get(name, ARTEFACTS[name].sd)
 
     def _artefacts(self, names: Names) -> list[Coordinate]:
         """Ordinary measurement errors, wider where named, and those that are in a set only."""
         named = {n.value for n in names if n in MEASUREMENT}
-        wanted = [n for n in FAULTS if n in ORDINARY or n in named]
+        wanted = [n for n in ARTEFACTS if n in ORDINARY or n in named]
         sds = {**self.error_sds, **{n: BEYOND * self.error_sd(n) for n in named}}
         trials, solutions = [t.name for t in self.trials], [t.solution for t in self.trials]
         return list(fault_coordinates(wanted, trials, solutions, sds))

@@ -36,7 +36,7 @@ class FilamentFriction(Extra):
     )
     entry = Entry(
         "weak_binding", "friction of bound heads",
-        "links that bound heads make are elastic for a short way, slip, and take time to form anew",
+        "links of bound heads are elastic for a short way, slip, and take time to form anew",
         "friction_force", 0.4, {"friction_way": 0.7, "friction_release": 1.5},
         tuple({"friction_force": 0.3, "friction_way": 0.007, "friction_release": rate} for rate in (8.0, 45.0)),
         # Links that never slip: absent friction halves no steps.

@@ -23,7 +23,7 @@ class PassiveViscoelasticity(Extra):
     states = tuple(State(f"pv_{i}", "L0", "stretch of a viscoelastic arm", -100.0, 100.0) for i in range(_ARMS))
     entry = Entry(
         "parallel_viscoelasticity", "passive viscoelasticity",
-        "springs with dashpots beside the cross-bridges, so that force decays after a stretch",
+        "springs with dashpots beside the cross-bridges; force decays after a stretch",
         "pv_stiffness", 2.0, {"pv_tau": 1.5, "pv_ratio": 0.7},
         tuple({"pv_stiffness": 0.5, "pv_tau": tau, "pv_ratio": 0.3} for tau in (0.005, 0.03, 0.2, 1.0)),
     )  # fmt: skip

@@ -20,7 +20,7 @@ class PersistentThickFilament(Extra):
     parameters = (PERSISTENCE,)
     entry = Entry(
         "regulation", "persistent thick filament",
-        "heads that force has woken stay awake after force is lost, and go to rest more slowly than the model has it",
+        "heads that force has woken go to rest more slowly than the model has it",
         "thick_persistence", 2.0, starts=({"thick_persistence": 2.0},), reach=4.0,
     )  # fmt: skip
 

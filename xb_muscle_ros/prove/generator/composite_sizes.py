@@ -1,4 +1,4 @@
-"""Sizes of the effects of a composite: what each leaves beside everything else that is there."""
+"""Unique contributions of the effects of a composite: what nothing else that is there can make up for."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.names import Name
+from xb_muscle_ros.prove.generator.artefacts import ORDINARY, Artefacts
 from xb_muscle_ros.prove.generator.case import Concealed, dressed, usable
 from xb_muscle_ros.prove.generator.effects import EFFECTS
-from xb_muscle_ros.prove.generator.nuisances import error_columns
-from xb_muscle_ros.prove.generator.ordinary import ORDINARY
-from xb_muscle_ros.prove.generator.recording import Faults
+from xb_muscle_ros.prove.generator.nuisances import artefact_columns
 from xb_muscle_ros.prove.generator.refit import Refit
-from xb_muscle_ros.prove.generator.rest import Rest, Taken
+from xb_muscle_ros.prove.generator.rest import LinearFit, Rest
 from xb_muscle_ros.prove.generator.study import Planned
 from xb_muscle_ros.prove.generator.truth import study_forces
 from xb_muscle_ros.prove.generator.world import Mesh, Stimulus, World
@@ -23,7 +22,7 @@ from xb_muscle_ros.prove.generator.world import Mesh, Stimulus, World
 Array = npt.NDArray[np.float64]
 
 LEAST_F0, MOST_F0 = 0.003, 0.05
-"""What an effect is to leave beside the rest, F0."""
+"""Bounds of the unique contribution of an effect, F0."""
 # What one effect may change of the force before any refit (RMS), F0: more, and it is hardly one effect among others.
 _USUAL_CHANGE_F0 = 0.2
 # What stands in for a part of the base changes more.
@@ -48,18 +47,18 @@ _COARSEST = Mesh(steps=1, dx=0.2, still=1e-5)
 
 
 class Sized:
-    """Sizes of effects in one fibre and one study with its ordinary errors.
+    """Sizes of effects in one fibre and one study with its ordinary artefacts.
 
     Attributes:
-        stimuli: what the fibre was truly given, by ordinary errors.
+        stimuli: what the fibre was truly given, by ordinary artefacts.
         constants: how many of the base can be fitted.
-        plain: what the base and ordinary errors can take up.
+        plain: what the base and ordinary artefacts can take up.
     """
 
-    def __init__(self, base: World, study: Sequence[Planned], ordinary: Faults) -> None:
+    def __init__(self, base: World, study: Sequence[Planned], ordinary: Artefacts) -> None:
         """Take slopes of the base."""
         self._base, self._study, self._ordinary = base, study, ordinary
-        self.stimuli = given(study, ordinary)
+        self.stimuli = ordinary.given(study)
         slopes = self._slopes(base, [])
         self.constants = slopes.constants
         self.plain = Rest(slopes.columns, len(study))
@@ -69,14 +68,14 @@ class Sized:
         """What effects change, F0, samples of all trials."""
         return self._force(concealed) - self._plain_force
 
-    def of_faults(self, faults: Faults) -> Taken:
-        """What is left of all that artefacts change beyond the ordinary errors, by a linear refit of the base."""
+    def of_artefacts(self, artefacts: Artefacts) -> LinearFit:
+        """What is left of all that artefacts change beyond the ordinary artefacts, by a linear refit of the base."""
         world = dressed([], self._base)
         both = [
-            [f.recorded(force, i) for i, force in enumerate(study_forces(world, given(self._study, f), _COARSEST))]
-            for f in (faults, self._ordinary)
+            [f.recorded(force, i) for i, force in enumerate(study_forces(world, f.given(self._study), _COARSEST))]
+            for f in (artefacts, self._ordinary)
         ]
-        return self.plain.take(np.concatenate(both[0]) - np.concatenate(both[1]))
+        return self.plain.fit(np.concatenate(both[0]) - np.concatenate(both[1]))
 
     def scaled(
         self, concealed: list[Concealed], sizes: Sequence[float], least: float
@@ -97,10 +96,10 @@ class Sized:
         more = _LINEAR * (1.0 + _BESIDE * (len(concealed) - 1))
         alone = [self._alone(c, more * size) for c, size in zip(concealed, sizes, strict=True)]
         # What leaves too little by itself leaves less beside others.
-        if not all(a.left >= least for a in alone):
-            return concealed, [a.left for a in alone]
+        if not all(a.residual >= least for a in alone):
+            return concealed, [a.residual for a in alone]
         concealed = self._kept([a.concealed for a in alone])
-        found = self.beside_rest(concealed, _ROUGHLY)
+        found = self.unique_contributions(concealed, _ROUGHLY)
         # A size that is not finite fails every comparison: such a fibre is not usable.
         if any(size < LEAST_F0 or size > MOST_F0 for size in found):
             factors = [float(np.clip(s / max(f, 1e-9), *_AT_ONCE)) for s, f in zip(sizes, found, strict=True)]
@@ -110,23 +109,23 @@ class Sized:
                     for c, factor, a in zip(concealed, factors, alone, strict=True)
                 ]
             )
-        return concealed, self.beside_rest(concealed, _WELL)
+        return concealed, self.unique_contributions(concealed, _WELL)
 
     def _alone(self, concealed: Concealed, size: float) -> _Alone:
         """The effect at a scale at which it alone leaves about so much, by linear refits."""
-        left, plausible = np.nan, EFFECTS[concealed.label].most * _MORE.get(concealed.label, 1.0)
+        residual, plausible = np.nan, EFFECTS[concealed.label].most * _MORE.get(concealed.label, 1.0)
         most = plausible
         for _ in range(4):
             difference = self.difference([concealed])
-            left, change = self.plain.take(difference).rms, float(np.sqrt(np.mean(difference**2)))
-            factor = float(np.clip(size / max(left, 1e-9), 0.05, 20.0)) if np.isfinite(left) else 0.3
+            residual, change = self.plain.fit(difference).rms, float(np.sqrt(np.mean(difference**2)))
+            factor = float(np.clip(size / max(residual, 1e-9), 0.05, 20.0)) if np.isfinite(residual) else 0.3
             within = _CHANGE_F0.get(concealed.label, _USUAL_CHANGE_F0) / change if np.isfinite(change) else 0.3
             most = min(plausible, concealed.scale * within)
             wanted = concealed._replace(scale=min(concealed.scale * factor, most))
             if abs(wanted.scale / concealed.scale - 1.0) < _NEAR:
                 break
             concealed = wanted
-        return _Alone(concealed, left, most)
+        return _Alone(concealed, residual, most)
 
     def _kept(self, concealed: list[Concealed]) -> list[Concealed]:
         """So much less of all effects that the fibre is one that is kept; perhaps in vain."""
@@ -136,7 +135,7 @@ class Sized:
             concealed = [c._replace(scale=_LESS * c.scale) for c in concealed]
         return concealed
 
-    def beside_rest(self, concealed: Sequence[Concealed], anew: int) -> list[float]:
+    def unique_contributions(self, concealed: Sequence[Concealed], anew: int) -> list[float]:
         """What each effect leaves if the model has all others, and all that the model has is fitted again, F0.
 
         Args:
@@ -147,9 +146,11 @@ class Sized:
         if not np.all(np.isfinite(data)):
             return [np.nan] * len(concealed)
         whole = self._slopes(self._base, concealed)
-        return [self._left_without(i, concealed, data, whole, anew) for i in range(len(concealed))]
+        return [self._residual_without(i, concealed, data, whole, anew) for i in range(len(concealed))]
 
-    def _left_without(self, i: int, concealed: Sequence[Concealed], data: Array, whole: _Slopes, anew: int) -> float:
+    def _residual_without(
+        self, i: int, concealed: Sequence[Concealed], data: Array, whole: _Slopes, anew: int
+    ) -> float:
         """RMS that a refit of everything but effect i leaves, F0."""
         others = [c for j, c in enumerate(concealed) if j != i]
         # Constants, and scales of the others, by their logarithms; then errors, in SDs.
@@ -177,7 +178,7 @@ class Sized:
     def _slopes(self, base: World, concealed: Sequence[Concealed]) -> _Slopes:
         """Slopes at a truth."""
         refit, scales = self._of_model(base, concealed)
-        errors = error_columns(
+        errors = artefact_columns(
             lambda shift, gain: study_forces(
                 dressed(concealed, base), [_moved(s, shift, gain) for s in self.stimuli], _COARSEST
             ),
@@ -207,7 +208,7 @@ class _Alone(NamedTuple):
     """An effect as it is alone, what it leaves by a linear refit, F0, and the scale that is not to be exceeded."""
 
     concealed: Concealed
-    left: float
+    residual: float
     most: float
 
 
@@ -216,18 +217,13 @@ class _Slopes(NamedTuple):
 
     Attributes:
         refit: of constants.
-        columns: constants, then logarithms of the effects' scales, then ordinary errors; shape (samples, coordinates).
+        columns: constants, logarithms of the effects' scales, ordinary artefacts; shape (samples, coordinates).
         constants: how many there are.
     """
 
     refit: Refit
     columns: Array
     constants: int
-
-
-def given(study: Sequence[Planned], faults: Faults) -> list[Stimulus]:
-    """What the fibre was truly given."""
-    return [trial.stimulus(faults.pca_shift.get(trial.pca, 0.0), faults.length_gain) for trial in study]
 
 
 def _moved(stimulus: Stimulus, shift: float, gain: float) -> Stimulus:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -44,10 +45,6 @@ class Effect(NamedTuple):
     apply: Callable[[Truth, float, Shape], Truth]
 
 
-def _none(random: np.random.Generator) -> Shape:
-    return {}
-
-
 def _between(**bounds: tuple[float, float]) -> Callable[[np.random.Generator], Shape]:
     """Draws each constant evenly on a log scale where its bounds are positive, else evenly."""
 
@@ -74,68 +71,52 @@ def _middle(values: Array) -> Array:
     return np.asarray(0.5 * (values[1:] + values[:-1]))
 
 
-def _acting(
-    calcium: Array | None = None, attachment: Array | None = None, switch_off: Array | None = None,
-    recruitment: Array | None = None, n: int = 0,
-) -> Acting:  # fmt: skip
-    plain = Acting.plain(n)
-    return Acting(
-        plain.calcium if calcium is None else calcium,
-        plain.attachment if attachment is None else attachment,
-        plain.switch_off if switch_off is None else switch_off,
-        plain.recruitment if recruitment is None else recruitment,
-    )
+def _on_input(what: str, change: Callable[[Stimulus, float, Shape], Array]) -> Callable[[Truth, float, Shape], Truth]:
+    """An effect that acts on the input by its stimulus alone: a field of `Acting`, one value per sample interval."""
+
+    def apply(truth: Truth, scale: float, shape: Shape) -> Truth:
+        def act(study: Sequence[Stimulus], i: int) -> Acting:
+            return replace(Acting.plain(study[i].length.size - 1), **{what: change(study[i], scale, shape)})
+
+        return truth.acting(act)
+
+    return apply
 
 
-def _drag(truth: Truth, scale: float, shape: Shape) -> Truth:
-    return truth.adding(lambda s, _: beside.saturating_drag(s.length, scale, shape["bend"]))
+def _beside(force: Callable[[Stimulus, float, Shape], Array]) -> Callable[[Truth, float, Shape], Truth]:
+    """An effect that is an element beside the heads, whose force is a function of the stimulus."""
+    return lambda truth, scale, shape: truth.adding(lambda stimulus, _: force(stimulus, scale, shape))
 
 
-def _viscoelastic(truth: Truth, scale: float, shape: Shape) -> Truth:
-    return truth.adding(
-        lambda s, _: beside.power_law_relaxation(s.length, scale, shape["exponent"], shape["steepness"])
-    )
+def _drag(s: Stimulus, scale: float, shape: Shape) -> Array:
+    return beside.saturating_drag(s.length, scale, shape["bend"])
 
 
-def _titin(truth: Truth, scale: float, shape: Shape) -> Truth:
-    return truth.adding(
-        lambda s, _: beside.bound_titin(
-            s.length, beside.titin_share(s, shape), scale, shape["contour"], shape["rebind_s"]
-        )
-    )
+def _viscoelastic(s: Stimulus, scale: float, shape: Shape) -> Array:
+    return beside.power_law_relaxation(s.length, scale, shape["exponent"], shape["steepness"])
 
 
-def _stiffened(truth: Truth, scale: float, shape: Shape) -> Truth:
-    return truth.adding(
-        lambda s, _: beside.stiffened_titin(s.length, beside.titin_share(s, shape), scale, shape["steepness"])
-    )
+def _titin(s: Stimulus, scale: float, shape: Shape) -> Array:
+    return beside.bound_titin(s.length, beside.titin_share(s, shape), scale, shape["contour"], shape["rebind_s"])
 
 
-def _sensitivity(truth: Truth, scale: float, shape: Shape) -> Truth:
-    def act(study: Sequence[Stimulus], i: int) -> Acting:
-        length = study[i].length
-        return _acting(calcium=10.0 ** (scale * _middle(length)), n=length.size - 1)
-
-    return truth.acting(act)
+def _stiffened(s: Stimulus, scale: float, shape: Shape) -> Array:
+    return beside.stiffened_titin(s.length, beside.titin_share(s, shape), scale, shape["steepness"])
 
 
-def _recruited(truth: Truth, scale: float, shape: Shape) -> Truth:
-    def act(study: Sequence[Stimulus], i: int) -> Acting:
-        length = np.maximum(study[i].length, 0.0)
-        late = beside.leaky(length, shape["delay_s"]) / shape["delay_s"]
-        more = np.expm1(shape["steepness"] * late) / shape["steepness"]
-        return _acting(recruitment=scale * _middle(more), n=length.size - 1)
+def _sensitivity(s: Stimulus, scale: float, shape: Shape) -> Array:
+    return np.asarray(10.0 ** (scale * _middle(s.length)))
 
-    return truth.acting(act)
+
+def _recruited(s: Stimulus, scale: float, shape: Shape) -> Array:
+    late = beside.leaky(np.maximum(s.length, 0.0), shape["delay_s"]) / shape["delay_s"]
+    return scale * _middle(np.expm1(shape["steepness"] * late) / shape["steepness"])
 
 
 def _slipping(truth: Truth, scale: float, shape: Shape) -> Truth:
+    way, unevenness, release_s = shape["way"], shape["unevenness"], shape["release_s"]
     return truth.adding(
-        lambda s, answer: (
-            scale
-            * answer.bound
-            * beside.slipping_friction(s.length, shape["way"], shape["unevenness"], shape["release_s"])
-        )
+        lambda s, answer: scale * answer.bound * beside.slipping_friction(s.length, way, unevenness, release_s)
     )
 
 
@@ -171,15 +152,8 @@ def _cooperative(truth: Truth, scale: float, shape: Shape) -> Truth:
 def _regulated(truth: Truth, scale: float, shape: Shape) -> Truth:
     # As many heads at full activation as before, or the fibre would be too weak to be kept.
     recruiting = 6.17 * (1.0 + shape["JF"] * 0.4 / (1.0 + 0.4 / shape["half_force"]))
-    return truth.changed(
-        {
-            At.F: truth.world.values["f"] * (1.0 + scale / recruiting),
-            At.THICK: float(Thick.FORCE_DEPENDENT),
-            At.J2: scale,
-            At.JF: shape["JF"],
-            At.J_SATURATION: shape["half_force"],
-        }
-    )
+    changes = {At.F: truth.world.values["f"] * (1.0 + scale / recruiting), At.THICK: float(Thick.FORCE_DEPENDENT)}
+    return truth.changed({**changes, At.J2: scale, At.JF: shape["JF"], At.J_SATURATION: shape["half_force"]})
 
 
 # Q10 of the rates: attachment and detachment of heads, both filaments.
@@ -194,29 +168,18 @@ def _warm(truth: Truth, scale: float, shape: Shape) -> Truth:
     return Truth(truth.world.with_values(warm), truth.acts, truth.adds)
 
 
-def _inactivated(truth: Truth, scale: float, shape: Shape) -> Truth:
-    def act(study: Sequence[Stimulus], i: int) -> Acting:
-        stretching = np.maximum(beside.velocity(study[i].length), 0.0)
-        lost = beside.leaky(stretching, shape["memory_s"])
-        return _acting(attachment=np.exp(-scale * _middle(lost)), n=lost.size - 1)
-
-    return truth.acting(act)
+def _inactivated(s: Stimulus, scale: float, shape: Shape) -> Array:
+    stretching = np.maximum(beside.velocity(s.length), 0.0)
+    return np.asarray(np.exp(-scale * _middle(beside.leaky(stretching, shape["decay_s"]))))
 
 
-def _switched_off(truth: Truth, scale: float, shape: Shape) -> Truth:
-    def act(study: Sequence[Stimulus], i: int) -> Acting:
-        moving = beside.leaky(np.abs(beside.velocity(study[i].length)), shape["memory_s"]) / shape["memory_s"]
-        return _acting(switch_off=1.0 + scale * _middle(moving), n=moving.size - 1)
-
-    return truth.acting(act)
+def _switched_off(s: Stimulus, scale: float, shape: Shape) -> Array:
+    moving = beside.leaky(np.abs(beside.velocity(s.length)), shape["decay_s"]) / shape["decay_s"]
+    return 1.0 + scale * _middle(moving)
 
 
-def _buffered(truth: Truth, scale: float, shape: Shape) -> Truth:
-    def act(study: Sequence[Stimulus], i: int) -> Acting:
-        moved = beside.leaky(beside.velocity(study[i].length), shape["memory_s"])
-        return _acting(calcium=np.exp(-scale * _middle(moved)), n=moved.size - 1)
-
-    return truth.acting(act)
+def _buffered(s: Stimulus, scale: float, shape: Shape) -> Array:
+    return np.asarray(np.exp(-scale * _middle(beside.leaky(beside.velocity(s.length), shape["decay_s"]))))
 
 
 def _damaged(truth: Truth, scale: float, shape: Shape) -> Truth:
@@ -228,17 +191,18 @@ def _damaged(truth: Truth, scale: float, shape: Shape) -> Truth:
 
     def act(study: Sequence[Stimulus], i: int) -> Acting:
         before = sum(float(stretched(earlier)[-1]) for earlier in study[:i])
-        return _acting(attachment=np.exp(-scale * (before + _middle(stretched(study[i])))), n=study[i].length.size - 1)
+        left = np.exp(-scale * (before + _middle(stretched(study[i]))))
+        return replace(Acting.plain(left.size), attachment=left)
 
     return truth.acting(act)
 
 
 _TITIN = {"half_pca": (6.0, 6.4), "hill": (2.0, 4.0)}
 _ROWS = (
-    Effect(Name.VISCOUS_DRAG.value, "drag at low speed, s", _ALL, 0.01, 0.1, _between(bend=(0.3, 2.0)), _drag),
+    Effect(Name.VISCOUS_DRAG.value, "drag at low speed, s", _ALL, 0.01, 0.1, _between(bend=(0.3, 2.0)), _beside(_drag)),
     Effect(
         Name.PASSIVE_VISCOELASTICITY.value, "stiffness, F0/L0", _ALL, 1.0, 15.0,
-        _between(exponent=(0.1, 0.4), steepness=(10.0, 30.0)), _viscoelastic,
+        _between(exponent=(0.1, 0.4), steepness=(10.0, 30.0)), _beside(_viscoelastic),
     ),
     Effect(
         Name.WEAKLY_BOUND_HEADS.value, "stiffness, cross-bridge force per power stroke", _ALL, 0.05, 0.5,
@@ -251,13 +215,16 @@ _ROWS = (
     ),
     Effect(
         Name.ACTIVE_TITIN.value, "stiffness when bound, F0/L0", _ALL, 2.0, 20.0,
-        _between(contour=(0.12, 0.25), rebind_s=(0.03, 0.3), **_TITIN), _titin,
+        _between(contour=(0.12, 0.25), rebind_s=(0.03, 0.3), **_TITIN), _beside(_titin),
     ),
     Effect(
         Name.STATIC_CALCIUM_STIFFNESS.value, "stiffness, F0/L0", _ALL, 2.0, 20.0,
-        _between(steepness=(5.0, 20.0), **_TITIN), _stiffened,
+        _between(steepness=(5.0, 20.0), **_TITIN), _beside(_stiffened),
     ),
-    Effect(Name.LENGTH_DEPENDENT_ACTIVATION.value, "pCa50 per length, 1/L0", _ALL, 1.5, 12.0, _none, _sensitivity),
+    Effect(
+        Name.LENGTH_DEPENDENT_ACTIVATION.value, "pCa50 per length, 1/L0", _ALL, 1.5, 12.0, _between(),
+        _on_input("calcium", _sensitivity),
+    ),
     Effect(
         Name.LATTICE_SPACING.value, "attachment per length at rest, 1/L0", _ALL, 2.0, 12.0, _between(best=(0.85, 0.95)),
         _set(At.LATTICE_SLOPE, best=At.LATTICE_BEST),
@@ -268,7 +235,7 @@ _ROWS = (
     ),
     Effect(
         Name.STRAIN_RECRUITED_HEADS.value, "J1's factor per length, 1/L0", ("3state_coop", "3state_coop_rigid"), 100.0,
-        5000.0, _between(steepness=(5.0, 25.0), delay_s=(0.003, 0.02)), _recruited,
+        5000.0, _between(steepness=(5.0, 25.0), delay_s=(0.003, 0.02)), _on_input("recruitment", _recruited),
     ),
     Effect(
         Name.PERSISTENT_THICK_FILAMENT.value, "logarithm of slowing, 1", ("3state_coop", "3state_coop_rigid"), 1.5, 4.0,
@@ -279,14 +246,14 @@ _ROWS = (
         500.0, 6000.0, _between(strain=(1.0, 3.0), steepness=(4.0, 10.0), rebind=(500.0, 3000.0)),
         _set(At.TEAR_RATE, strain=At.TEAR_STRAIN, steepness=At.TEAR_STEEPNESS, rebind=At.REBIND_RATE),
     ),
-    Effect(Name.NONLINEAR_CROSSBRIDGE.value, "curvature, 1", _ALL, 0.1, 0.8, _none, _set(At.HEAD_CURVATURE)),
+    Effect(Name.NONLINEAR_CROSSBRIDGE.value, "curvature, 1", _ALL, 0.1, 0.8, _between(), _set(At.HEAD_CURVATURE)),
     Effect(Name.HALF_SARCOMERE_SPREAD.value, "SD of strength, 1", _COMPLIANT, 0.05, 0.2, _draw_spread, _spread),
     Effect(
         Name.SERIES_COMPLIANCE.value, "length scale of the spring, power strokes",
         ("3state_coop_rigid", "2state_coop_rigid"), 1.0, 8.0, _between(force=(0.1, 0.4)), _compliance,
     ),
     Effect(
-        Name.THIN_FILAMENT_COOPERATIVITY.value, "affinity per bound head, decades", ("2state",), 0.5, 3.0, _none,
+        Name.THIN_FILAMENT_COOPERATIVITY.value, "affinity per bound head, decades", ("2state",), 0.5, 3.0, _between(),
         _cooperative,
     ),
     Effect(
@@ -298,28 +265,28 @@ _ROWS = (
         _warm,
     ),
     Effect(
-        Name.PHOSPHATE.value, "detachment before the stroke, 1/s", ("3state_coop", "2state_coop"), 30.0, 400.0, _none,
-        _set(At.PHOSPHATE_RATE),
+        Name.PHOSPHATE.value, "detachment before the stroke, 1/s", ("3state_coop", "2state_coop"), 30.0, 400.0,
+        _between(), _set(At.PHOSPHATE_RATE),
     ),
 )  # fmt: skip
 _OUTSIDE = (
     Effect(
         "outside:inactivation_after_stretch", "attachment lost per stretch, 1/L0", _ALL, 2.0, 20.0,
-        _between(memory_s=(1.0, 2.0)), _inactivated,
+        _between(decay_s=(1.0, 2.0)), _on_input("attachment", _inactivated),
     ),
     Effect(
         "outside:movement_switches_off", "rise of koff per speed, s/L0", _COMPLIANT, 1.0, 60.0,
-        _between(memory_s=(0.03, 0.08)), _switched_off,
+        _between(decay_s=(0.03, 0.08)), _on_input("switch_off", _switched_off),
     ),
     Effect(
         "outside:calcium_after_movement", "calcium lost per stretch, 1/L0", _ALL, 3.0, 30.0,
-        _between(memory_s=(0.2, 0.8)), _buffered,
+        _between(decay_s=(0.2, 0.8)), _on_input("calcium", _buffered),
     ),
     Effect(
         "outside:series_creep", "creep per force, power strokes", _COMPLIANT, 6.0, 15.0, _between(tau_s=(0.4, 2.0)),
         _set(At.CREEP, tau_s=At.CREEP_TIME),
     ),
-    Effect("outside:damage_by_stretch", "heads lost per stretch, 1/L0", _ALL, 0.5, 8.0, _none, _damaged),
+    Effect("outside:damage_by_stretch", "heads lost per stretch, 1/L0", _ALL, 0.5, 8.0, _between(), _damaged),
 )  # fmt: skip
 
 EFFECTS: Mapping[str, Effect] = MappingProxyType({row.label: row for row in (*_ROWS, *_OUTSIDE)})

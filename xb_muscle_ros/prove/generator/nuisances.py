@@ -1,4 +1,4 @@
-"""How much of an effect usual faults of the measurement could explain as well."""
+"""How much of an effect ordinary measurement artefacts could explain as well."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.names import Name
-from xb_muscle_ros.prove.generator.recording import PRIORS
+from xb_muscle_ros.prove.generator.artefacts import PRIORS
 from xb_muscle_ros.prove.generator.refit import Refit, Refitted
 from xb_muscle_ros.prove.generator.study import Planned
 from xb_muscle_ros.prove.generator.truth import Truth, study_forces
@@ -21,39 +21,39 @@ _SHIFT, _GAIN = 0.01, 0.01
 _WORTH, _WORTH_SD = 10.0, 0.003
 
 
-def left_beside_nuisances(base: World, study: Sequence[Planned], refit: Refit, refitted: Refitted) -> list[Array]:
-    """What is left, F0, by trial, when constants and usual faults together are fitted once more, linearly.
+def residual_beside_nuisances(base: World, study: Sequence[Planned], refit: Refit, refitted: Refitted) -> list[Array]:
+    """Residual, F0, by trial, when constants and ordinary artefacts together are fitted once more, linearly.
 
-    Faults have their usual SDs as priors: pCa of each solution, length gain, run-down, offset and drift of each
+    Artefacts have their usual SDs as priors: pCa of each solution, length gain, run-down, offset and drift of each
     trial, delay (a transducer's lag is the same to first order).
     """
-    left = np.concatenate(refitted.left)
-    if not np.any(left):
-        return list(refitted.left)
-    truth, sizes = Truth(base), {name: prior.sd for name, prior in PRIORS.items()}
-    columns = error_columns(
+    residual = np.concatenate(refitted.residual)
+    if not np.any(residual):
+        return list(refitted.residual)
+    truth, sizes = Truth(base), {name: prior.ordinary for name, prior in PRIORS.items()}
+    columns = artefact_columns(
         lambda shift, gain: study_forces(truth, [trial.stimulus(shift, gain) for trial in study]),
         study, refit.plain(), sizes,
     )  # fmt: skip
     jacobian = np.column_stack([refit.jacobian, *columns])
-    weight = np.sqrt(_WORTH * len(study) / left.size) / _WORTH_SD
+    weight = np.sqrt(_WORTH * len(study) / residual.size) / _WORTH_SD
     a = np.vstack([weight * jacobian, np.eye(jacobian.shape[1])])
-    b = np.concatenate([weight * left, np.zeros(jacobian.shape[1])])
+    b = np.concatenate([weight * residual, np.zeros(jacobian.shape[1])])
     solution: Array = np.linalg.lstsq(a, b, rcond=None)[0]
-    return refit.split(left - jacobian @ solution)
+    return refit.split(residual - jacobian @ solution)
 
 
-def error_columns(
+def artefact_columns(
     forces: Callable[[float, float], Sequence[Array]], study: Sequence[Planned], plain: Sequence[Array],
     sizes: Mapping[str, float],
 ) -> list[Array]:  # fmt: skip
-    """Change of all forces by one SD of each error of the measurement.
+    """Change of all forces by one SD of each measurement artefact.
 
     Args:
         forces: of every trial, F0, where pCa is so much higher and length changes are so much larger.
         study: planned trials.
-        plain: forces without errors.
-        sizes: SD by name of the error: pCa of each solution, length gain, run-down, delay, offset and drift of each
+        plain: forces without artefacts.
+        sizes: SD by name of the artefact: pCa of each solution, length gain, run-down, delay, offset and drift of each
             trial. Those that are not named are left out.
     """
 

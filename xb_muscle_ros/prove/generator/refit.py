@@ -1,4 +1,4 @@
-"""What is left of an effect once the parameters of the base have been fitted to it: the only size that matters."""
+"""The residual of an effect once the parameters of the base have been fitted to it: the only size that matters."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ class Refitted(NamedTuple):
     """A refit of the plain base.
 
     Attributes:
-        rms: of what is left over all samples, F0.
-        left: data minus base, F0, by trial.
+        rms: of the residual over all samples, F0.
+        residual: data minus base, F0, by trial.
         values: of the fitted constants.
         at: where these lie: changes of their logarithms, and of the parallel spring.
     """
 
     rms: float
-    left: list[Array]
+    residual: list[Array]
     values: dict[str, float]
     at: Array
 
@@ -73,8 +73,8 @@ class Refit:
         """Forces of the base at the true constants."""
         return self.split(self._plain)
 
-    def left_at_once(self, forces: Sequence[Array]) -> float:
-        """RMS left of data by a linear fit, F0."""
+    def linear_rms(self, forces: Sequence[Array]) -> float:
+        """RMS residual of a linear fit, F0."""
         r = np.concatenate(list(forces)) - self._plain
         return float(np.sqrt(np.mean((r - self.jacobian @ self._solve(self.jacobian, r, self._at)) ** 2)))
 
@@ -92,8 +92,8 @@ class Refit:
         ):
             at, model, jacobian = start.at, found, self._jacobian_at(start.at, found)
         at, model = self._descend(data, at, model, jacobian)
-        left = data - model
-        return Refitted(float(np.sqrt(np.mean(left**2))), self.split(left), self.values_at(at), at)
+        residual = data - model
+        return Refitted(float(np.sqrt(np.mean(residual**2))), self.split(residual), self.values_at(at), at)
 
     def _descend(self, data: Array, at: Array, model: Array, jacobian: Array) -> tuple[Array, Array]:
         """Damped Gauss-Newton steps, the Jacobian taken anew after each.

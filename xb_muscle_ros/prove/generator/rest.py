@@ -1,4 +1,4 @@
-"""What a model that lacks something leaves, once all that it has is fitted again, ordinary errors among it."""
+"""The residual of a model that lacks something, once all that it has is fitted again, ordinary artefacts among it."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ _WORTHWHILE, _SURELY = 0.1, 2
 _FARTHEST = 0.7
 
 
-class Taken(NamedTuple):
+class LinearFit(NamedTuple):
     """A linear fit.
 
     Attributes:
-        left: what it leaves, F0, shape (samples,).
-        pulled: how far each coordinate went, in SDs of its prior, shape (coordinates,).
+        residual: F0, shape (samples,).
+        prior_residual: how far each coordinate went, in SDs of its prior, shape (coordinates,).
     """
 
-    left: Array
-    pulled: Array
+    residual: Array
+    prior_residual: Array
 
     @property
     def rms(self) -> float:
-        """Of what is left, F0."""
-        return float(np.sqrt(np.mean(self.left**2)))
+        """Of the residual, F0."""
+        return float(np.sqrt(np.mean(self.residual**2)))
 
 
 class Rest:
-    """All that may change to take up a difference: constants, other effects' scales, ordinary errors of measurement."""
+    """All that may change to take up a difference: constants, other effects' scales, ordinary measurement artefacts."""
 
     def __init__(self, columns: Array, trials: int) -> None:
         """Take the change of all forces by one prior SD of each coordinate.
@@ -51,19 +51,19 @@ class Rest:
         self._columns = columns
         self._weight = np.sqrt(WORTH * trials / self._columns.shape[0]) / WORTH_SD
 
-    def take(self, difference: Array) -> Taken:
+    def fit(self, difference: Array) -> LinearFit:
         """Penalised least squares of data minus model, F0, shape (samples,); NaN where these are not finite."""
         if not (np.all(np.isfinite(difference)) and np.all(np.isfinite(self._columns))):
-            return Taken(np.full(difference.size, np.nan), np.full(self._columns.shape[1], np.nan))
+            return LinearFit(np.full(difference.size, np.nan), np.full(self._columns.shape[1], np.nan))
         a = self._weight * self._columns
         factor = cho_factor(a.T @ a + np.eye(a.shape[1]))
-        pulled: Array = cho_solve(factor, self._weight * (a.T @ difference))
-        return Taken(difference - self._columns @ pulled, pulled)
+        at: Array = cho_solve(factor, self._weight * (a.T @ difference))
+        return LinearFit(difference - self._columns @ at, at)
 
     def refit(
         self, data: Array, model: Callable[[Array], Array], slopes: Callable[[Array], Array], logarithms: int,
         anew: int,
-    ) -> Taken:  # fmt: skip
+    ) -> LinearFit:  # fmt: skip
         """Fit data by damped Gauss-Newton steps whose slopes are corrected by what each step has shown (Broyden).
 
         Args:
@@ -82,7 +82,7 @@ class Rest:
             if taken == anew or (taken >= _SURELY and not cost < (1.0 - _WORTHWHILE) * before):
                 break
             columns = slopes(at)
-        return Taken(data - force, at)
+        return LinearFit(data - force, at)
 
     def _descend(
         self, data: Array, model: Callable[[Array], Array], logarithms: int, at: Array, force: Array, columns: Array
@@ -106,11 +106,11 @@ class Rest:
                 break
         return at, force, cost
 
-    def _cost(self, left: Array, at: Array) -> float:
-        return float(self._weight**2 * np.sum(left**2) + np.sum(at**2))
+    def _cost(self, residual: Array, at: Array) -> float:
+        return float(self._weight**2 * np.sum(residual**2) + np.sum(at**2))
 
-    def _step(self, columns: Array, left: Array, at: Array, damping: float) -> Array:
+    def _step(self, columns: Array, residual: Array, at: Array, damping: float) -> Array:
         a = self._weight * columns
         curvature = a.T @ a + np.eye(at.size)
         curvature[np.diag_indices(at.size)] *= 1.0 + damping
-        return np.asarray(np.linalg.solve(curvature, self._weight * (a.T @ left) - at))
+        return np.asarray(np.linalg.solve(curvature, self._weight * (a.T @ residual) - at))

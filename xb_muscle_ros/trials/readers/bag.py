@@ -4,26 +4,82 @@ from __future__ import annotations
 
 import re
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+from rosbags.interfaces import MessageDefinitionFormat
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
+from xb_muscle_ros.trials.bag_contents import BagContents, all_decoded, open_bag
 from xb_muscle_ros.trials.bag_files import METADATA, is_bag
-from xb_muscle_ros.trials.mcap_records import MAGIC
-from xb_muscle_ros.trials.readers.base import Pending, begin_of
+from xb_muscle_ros.trials.mcap_records import MAGIC, Message
+from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal, begin_of
 from xb_muscle_ros.trials.readers.columns import BAG
-from xb_muscle_ros.trials.readers.description import Column, ImportMapping
+from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled
 from xb_muscle_ros.trials.readers.fields import FieldPath
-from xb_muscle_ros.trials.readers.foreign_bag import SQLITE, ForeignBag, open_foreign, sqlite_parts
-from xb_muscle_ros.trials.readers.recording import Recording, Signal
+from xb_muscle_ros.trials.stamps import not_after, to_s
 from xb_muscle_ros.trials.trial import Array
+
+SQLITE = b"SQLite format 3\x00"
+_FORMATS = {MessageDefinitionFormat.MSG: "ros2msg", MessageDefinitionFormat.IDL: "ros2idl"}
+
+
+def open_any(path: Path, wanted: Collection[str]) -> BagContents:
+    """Open a bag; messages of the wanted topics alone are kept.
+
+    Raises:
+        UserError: it cannot be read.
+    """
+    return _sqlite(path, wanted) if _is_sqlite(path) else open_bag(path, wanted)
+
+
+def _is_sqlite(path: Path) -> bool:
+    """Whether a file or a bag folder is of SQLite: by its begin, or by its files' names."""
+    if path.is_dir():
+        told = path / METADATA
+        named = told.is_file() and b"storage_identifier: sqlite3" in told.read_bytes()
+        return not any(path.glob("*.mcap")) and (named or any(path.glob("*.db3")))
+    return path.suffix.lower() == ".db3" or begin_of(path).startswith(SQLITE)
+
+
+def sqlite_parts(folder: Path) -> list[Path]:
+    """The files of a split SQLite bag without metadata, in order: one name with the numbers 0, 1, 2, ...; or none."""
+    found = {file.stem.rpartition("_")[2]: file for file in folder.glob("*.db3")}
+    names = {file.stem.rpartition("_")[0] for file in folder.glob("*.db3")}
+    if (folder / METADATA).is_file() or len(names) != 1 or set(found) != {str(i) for i in range(len(found))}:
+        return []
+    return [found[str(i)] for i in range(len(found))]
+
+
+def _sqlite(path: Path, wanted: Collection[str]) -> BagContents:
+    from rosbags.highlevel import AnyReader
+
+    files = [path]
+    flaws: tuple[str, ...] = ()
+    if path.is_dir() and not (path / METADATA).is_file():
+        files, flaws = sqlite_parts(path), (f"{METADATA} is missing",)
+        if not files:
+            raise UserError(f"bag {path} has no {METADATA}; make it anew with ros2 bag reindex {path} sqlite3")
+    bag = BagContents(path, {}, {}, {}, {}, {}, None, flaws)
+    for file in files:
+        try:
+            with AnyReader([file], default_typestore=ros_types.typestore()) as reader:
+                for each in reader.connections:
+                    bag.types[each.topic], bag.encodings[each.topic] = each.msgtype, "cdr"
+                    if each.msgdef.format in _FORMATS:
+                        bag.definitions[each.msgtype] = (_FORMATS[each.msgdef.format], each.msgdef.data)
+                used = [each for each in reader.connections if each.topic in wanted]
+                for connection, log_ns, data in reader.messages(connections=used) if used else ():
+                    message = Message(connection.topic, log_ns, bytes(data))
+                    bag.messages.setdefault(connection.topic, []).append(message)
+        except Exception as problem:  # the library passes on what its parsers trip over
+            raise UserError(f"bag {path} cannot be read: {problem}; record or convert it again") from problem
+    return bag
 
 
 @dataclass
@@ -50,11 +106,12 @@ class _Series:
     skipped: int = 0
 
 
-class BagReader:
+class BagReader(Reader):
     """One trial to a bag. Times begin at the first length message; other signals keep their own."""
 
     name = "bag"
-    suffixes: tuple[str, ...] = (".mcap", ".db3")
+    suffixes = (".mcap", ".db3")
+    begins = (MAGIC, SQLITE)
     kind = BAG
     defaults: Mapping[str, Any] = {
         "fibre": "{file}",
@@ -68,52 +125,36 @@ class BagReader:
         """Whether it is a bag's folder, or a file that begins or is called like a bag's."""
         if path.is_dir():
             return (path / METADATA).is_file() or is_bag(path) or bool(sqlite_parts(path))
-        if path.suffix.lower() in self.suffixes:
-            return True
-        begin = begin_of(path, len(SQLITE))
-        return begin.startswith(MAGIC) or begin == SQLITE
+        return super().matches(path)
 
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
         """The one trial of the bag."""
-        yield Pending(mapping.trial_of(path), lambda: _recording(path, mapping))
-
-    def pca(self, path: Path, mapping: ImportMapping) -> float | None:
-        """As the bag's name or the mapping tells."""
-        return mapping.facts_of(path)["pca"]
+        yield Pending(filled(mapping.trial, path), lambda: _recording(path, mapping))
 
 
 def _recording(path: Path, mapping: ImportMapping) -> Recording:
-    columns = {
-        "length": mapping.length,
-        "force": mapping.force,
-        "calcium": mapping.calcium,
-        "stimulation": None if mapping.stimulation is None else mapping.stimulation.column,
-    }
-    wanted = {key: column for key, column in columns.items() if column is not None}
+    wanted = {key: column for key, column in mapping.columns.items() if key != "time"}
     bag, found = _read(path, wanted, mapping.time.name)
     first_ns = int(found["length"].stamps_ns[0])
     signals = {key: _signal(one, first_ns, key) for key, one in found.items()}
     length = signals["length"]
     assert length.times is not None  # every signal of a bag has its own
+    time = Signal(f"{mapping.time.name} stamp of {mapping.length.name}", length.times, length.at)
     begin = datetime.fromtimestamp(first_ns / 1e9, tz=timezone.utc).isoformat(timespec="milliseconds")
     return Recording(
-        where=f"bag {path}",
-        trial=mapping.trial_of(path),
-        time=Signal(f"{mapping.time.name} stamp of {mapping.length.name}", length.times, length.at),
-        length=replace(length, times=None),
-        force=signals.get("force"),
-        calcium=signals.get("calcium"),
-        stimulation=signals.get("stimulation"),
-        facts=mapping.facts_of(path),
-        notes=(f"time 0 is stamp {first_ns} ns ({begin})",),
-        warnings=(*_state(path, bag), *_left_out(path, found, signals)),
+        f"bag {path}",
+        filled(mapping.trial, path),
+        {"time": time, **signals, "length": replace(length, times=None)},
+        mapping.facts_of(path),
+        (f"time 0 is stamp {first_ns} ns ({begin})",),
+        (*_state(path, bag), *_left_out(path, found, signals)),
     )
 
 
-def _state(path: Path, bag: ForeignBag) -> Iterator[str]:
+def _state(path: Path, bag: BagContents) -> Iterator[str]:
     """What is wrong with the bag's files."""
     if bag.flaws:
-        yield f"bag {path}: {'; '.join(bag.flaws)}; {sum(bag.counts.values())} messages were read"
+        yield f"bag {path}: {'; '.join(bag.flaws)}; {sum(map(len, bag.messages.values()))} messages were read"
     number = re.fullmatch(r"(.+_)\d+", path.stem)
     if path.is_file() and number is not None:
         others = [f for f in path.parent.glob(f"{number.group(1)}*{path.suffix}") if f != path]
@@ -143,7 +184,7 @@ def _left_out(path: Path, found: Mapping[str, _Series], signals: Mapping[str, Si
 
 def _signal(one: _Series, first_ns: int, key: str) -> Signal:
     """A topic from the first length on; what holds until it changes begins with what held then."""
-    times = (np.array(one.stamps_ns, dtype=np.int64) - first_ns) / np.float64(1e9)
+    times = to_s(np.array(one.stamps_ns, dtype=np.int64) - first_ns)
     values: Array = np.array(one.values)
     first = int(np.searchsorted(times, 0.0))
     if key in ("calcium", "stimulation") and first and (first == times.size or times[first] > 0.0):
@@ -154,24 +195,23 @@ def _signal(one: _Series, first_ns: int, key: str) -> Signal:
     return Signal(name, values[first:], lambda i: f"message {numbers[i]}", times[first:])
 
 
-def _read(path: Path, wanted: Mapping[str, Column], stamp: str) -> tuple[ForeignBag, dict[str, _Series]]:
+def _read(path: Path, wanted: Mapping[str, Column], stamp: str) -> tuple[BagContents, dict[str, _Series]]:
     """Stamps and values of the wanted signals; stamps increase."""
     found = {key: _Series(column, FieldPath(column.field, f"bag {path}")) for key, column in wanted.items()}
     topics = {column.name for column in wanted.values()}
-    bag = open_foreign(path, topics)
-    if not bag.topics:
+    bag = open_any(path, topics)
+    if not bag.types:
         raise UserError(f"bag {path} is empty: {'; '.join(bag.flaws) or 'it has no topic'}; record it again")
     for topic in sorted(topics):
-        if topic not in bag.topics:
+        if topic not in bag.types:
             raise UserError(
-                f"bag {path} has no topic {topic}; its topics: {', '.join(sorted(bag.topics))}; name the topic in "
+                f"bag {path} has no topic {topic}; its topics: {', '.join(sorted(bag.types))}; name the topic in "
                 "columns of the mapping"
             )
-        if not bag.counts[topic]:
-            flaws = f" ({'; '.join(bag.flaws)})" if bag.flaws else ""
-            raise UserError(f"bag {path} has no message on {topic}{flaws}; record the topic")
+        if topic not in bag.messages:
+            raise UserError(f"bag {path} has no message on {topic}{bag.flaws_text}; record the topic")
     numbers = dict.fromkeys(topics, 0)
-    for topic, log_ns, message in bag.messages:
+    for topic, log_ns, message in all_decoded(bag):
         where = f"bag {path}, {topic}, message {numbers[topic]}"
         for one in found.values():
             if one.column.name == topic:
@@ -209,10 +249,10 @@ def _check(path: Path, one: _Series, stamp: str) -> None:
             f"{where}, {one.path.text}: there is no joint '{one.path.joint}' in any of {one.skipped} messages; joints "
             f"there: {', '.join(one.joints) or 'none'}"
         )
-    stamps: npt.NDArray[np.int64] = np.array(one.stamps_ns, dtype=np.int64)
-    back = np.flatnonzero(np.diff(stamps) <= 0)
+    stamps = np.array(one.stamps_ns, dtype=np.int64)
+    back = not_after(stamps)
     if back.size:
-        i = int(back[0]) + 1
+        i = int(back[0])
         more = f" ({back.size} such in all)" if back.size > 1 else ""
         unset = stamp == "header" and not stamps.any()
         remedy = (

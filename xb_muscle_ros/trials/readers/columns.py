@@ -1,20 +1,20 @@
-"""The ``columns`` of a mapping: where each signal is, and its unit."""
+"""The signals of a mapping: the ``columns``, where each is, and its unit, and ``activation``, which makes calcium."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+import math
 
-from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.readers.description import LENGTHS_OF, Column, Stimulation, finite
-from xb_muscle_ros.trials.readers.tree import check_keys, choice_at, subtree, text_at
+from xb_muscle_ros.errors import UserError, naming
+from xb_muscle_ros.trials.activation import CalciumTransient
+from xb_muscle_ros.trials.readers.description import Activation, Column, Stimulation
+from xb_muscle_ros.trials.readers.tree import Keys
 from xb_muscle_ros.trials.readers.units import Unit, quantity, unit_of
 
 FILE = "file"
 BAG = "bag"
 
-# Beside where the signal is and its unit.
-_MORE = {
+# Signals, and what a mapping may tell of each beside where it is and its unit.
+SIGNALS = {
     "time": ("largest_step", "rate"),
     "length": ("is", "of", "at_reference"),
     "force": ("zero",),
@@ -22,122 +22,110 @@ _MORE = {
     "stimulation": ("threshold", "pulse_gap"),
 }
 _PLACE = {FILE: ("column",), BAG: ("topic", "field")}
-_DEFAULT_PULSE_GAP = "15 ms"
+_PULSE_GAP_S = 0.015
 _SECONDS = Unit("time", 1.0)
+NEVER = "never"
+FORCE_DROP = "force_drop"
+_CONSTANTS = {"rest": "0.05 uM", "tetanus": "8 uM", "rise": "50 ms", "decay": "30 ms"}
 
 
-class Columns(NamedTuple):
-    """Fields of an `ImportMapping` that the columns tell."""
-
-    time: Column
-    length: Column
-    force: Column | None
-    calcium: Column | None
-    stimulation: Stimulation | None
-    length_is_change: bool
-    length_of: str
-    trial_column: str | None
-    rate_hz: float | None
-    at_reference: float | None
-    largest_step_s: float | None
-    force_zero_from_slack: bool
-
-
-def read_columns(tree: Mapping[str, Any], where: str, kind: str) -> Columns:
-    """Check the columns of a mapping.
+def read_column(columns: Keys, key: str, kind: str) -> Column:
+    """Where a signal is.
 
     Args:
-        tree: signals by name.
-        where: the mapping file, for messages.
+        columns: signals by name.
+        key: the signal, one of `SIGNALS`.
         kind: `FILE` where signals are columns or channels, `BAG` where they are topics.
 
     Raises:
-        UserError: an unknown or missing key, unit or value.
+        UserError: an unknown or missing key, or an unknown unit.
     """
-    check_keys(tree, (*_MORE, "trial"), "columns.", where)
-    time, length = _column(tree, "time", where, kind), _column(tree, "length", where, kind)
-    length_keys, force_keys = _keys(tree, "length", where), _keys(tree, "force", where)
-    step = _keys(tree, "time", where).get("largest_step")
-    return Columns(
-        time=time,
-        length=length,
-        force=_column(tree, "force", where, kind) if "force" in tree else None,
-        calcium=_column(tree, "calcium", where, kind) if "calcium" in tree else None,
-        stimulation=_stimulation(tree, where, kind) if "stimulation" in tree else None,
-        length_is_change=choice_at(length_keys, "is", ("absolute", "change"), "columns.length.", where) == "change",
-        length_of=choice_at(length_keys, "of", LENGTHS_OF, "columns.length.", where),
-        trial_column=_trial_column(tree, where, kind),
-        rate_hz=_rate_hz(tree, where),
-        at_reference=_at_reference(length_keys, length, where),
-        largest_step_s=None
-        if step is None
-        else quantity(str(step), "time", "columns.time.largest_step", where, "0.5 s").value,
-        force_zero_from_slack=choice_at(force_keys, "zero", ("as_recorded", "slack"), "columns.force.", where)
-        == "slack",
-    )
-
-
-def _at_reference(keys: Mapping[str, Any], length: Column, where: str) -> float | None:
-    if "at_reference" not in keys:
-        return None
-    what = "columns.length.at_reference"
-    reference = quantity(str(keys["at_reference"]), "length", what, where, "42.5 mm")
-    if reference.kind != length.unit.kind:
-        raise UserError(f"{where}: {what} has to be a {length.unit.kind}, as the column is")
-    return reference.value
-
-
-def _column(tree: Mapping[str, Any], key: str, where: str, kind: str) -> Column:
-    if key not in tree:
+    if key not in columns:
         more = ", or give its rate" if key == "time" else ""
-        raise UserError(f"{where}: columns.{key} is missing; name the column and its unit{more}")
-    keys = _keys(tree, key, where)
-    here = f"{where}: columns.{key}"
-    if kind == BAG and key == "time":
-        check_keys(keys, ("stamp", "largest_step"), f"columns.{key}.", where)
-        return Column(choice_at(keys, "stamp", ("header", "log"), "columns.time.", where), "s", _SECONDS)
-    check_keys(keys, (*_PLACE[kind], "unit", *_MORE[key]), f"columns.{key}.", where)
+        raise UserError(f"{columns.where}: columns.{key} is missing; name the column and its unit{more}")
+    place = _PLACE[kind][0]
+    if key == "time" and kind == BAG:
+        return Column(columns.below(key, "stamp", "largest_step").choice("stamp", "header", "log"), "s", _SECONDS)
+    keys = columns.below(key, *_PLACE[kind], "unit", *SIGNALS[key])
     if key == "time" and "rate" in keys:
         if "column" in keys:
-            raise UserError(f"{where}: columns.time has a column and a rate; the column tells the times, leave one out")
-        return Column(f"time at {keys['rate']}", "s", _SECONDS)
-    name = text_at(keys, _PLACE[kind][0], here, needed=f"name the {_PLACE[kind][0]}")
-    field = (
-        text_at(keys, "field", here, needed=f"name the field of {name}, for example position[0]") if kind == BAG else ""
-    )
-    unit_name = text_at(keys, "unit", here, needed=f"give the unit of {_PLACE[kind][0]} '{name}'")
-    return Column(name, unit_name, unit_of(unit_name, key, where), field)
+            raise UserError(
+                f"{keys.where}: columns.time has a column and a rate; the column tells the times, leave one out"
+            )
+        return Column(f"time at {keys.values['rate']}", "s", _SECONDS)
+    name = keys.text(place, f"name the {place}")
+    field = keys.text("field", f"name the field of {name}, for example position[0]") if kind == BAG else ""
+    unit_name = keys.text("unit", f"give the unit of {place} '{name}'")
+    return Column(name, unit_name, unit_of(unit_name, key, keys.where), field)
 
 
-def _rate_hz(tree: Mapping[str, Any], where: str) -> float | None:
-    rate = _keys(tree, "time", where).get("rate")
-    return None if rate is None else quantity(str(rate), "rate", "columns.time.rate", where, "1000 Hz").value
+def optional_column(columns: Keys, key: str, kind: str) -> Column | None:
+    """Where a signal is that may be there; see `read_column`."""
+    return read_column(columns, key, kind) if key in columns else None
 
 
-def _trial_column(tree: Mapping[str, Any], where: str, kind: str) -> str | None:
-    if "trial" not in tree:
+def read_stimulation(columns: Keys, kind: str) -> Stimulation | None:
+    """Where stimulation is, if anywhere, and how it is told from rest; see `read_column`."""
+    column = optional_column(columns, "stimulation", kind)
+    if column is None:
+        return None
+    keys = columns.below("stimulation")
+    threshold = keys.number("threshold") if "threshold" in keys else 0.5
+    gap_s = keys.amount("pulse_gap", "time", "15 ms", zero=True)
+    return Stimulation(column, threshold * column.unit.factor, _PULSE_GAP_S if gap_s is None else gap_s)
+
+
+def trial_column(columns: Keys, kind: str) -> str | None:
+    """The column that tells trials apart, where one is named.
+
+    Raises:
+        UserError: it is of a bag, or has no name.
+    """
+    if "trial" not in columns:
         return None
     if kind == BAG:
-        raise UserError(f"{where}: columns.trial is for tables; a bag is one trial; leave it out")
-    keys = _keys(tree, "trial", where)
-    check_keys(keys, ("column",), "columns.trial.", where)
-    return text_at(keys, "column", f"{where}: columns.trial", needed="name the column")
+        raise UserError(f"{columns.where}: columns.trial is for tables; a bag is one trial; leave it out")
+    return columns.below("trial", "column").text("column", "name the column")
 
 
-def _stimulation(tree: Mapping[str, Any], where: str, kind: str) -> Stimulation:
-    keys = _keys(tree, "stimulation", where)
-    column = _column(tree, "stimulation", where, kind)
-    threshold = finite(keys.get("threshold", 0.5), "columns.stimulation.threshold", where)
-    gap = quantity(
-        str(keys.get("pulse_gap", _DEFAULT_PULSE_GAP)),
-        "time",
-        "columns.stimulation.pulse_gap",
-        where,
-        "15 ms",
-        zero=True,
-    )
-    return Stimulation(column, threshold * column.unit.factor, gap.value)
+def read_activation(mapping: Keys) -> Activation | None:
+    """The activation of a mapping, where it has one.
+
+    Raises:
+        UserError: an unknown or missing key, or a value that is not allowed.
+    """
+    if mapping.values.get("activation") is None:
+        return None
+    keys = mapping.below("activation", *_CONSTANTS, "source", "begin", "end")
+    values = [_constant(keys, name, example) for name, example in _CONSTANTS.items()]
+    with naming(keys.where):
+        transient = CalciumTransient(*values)
+    return Activation(transient, keys.line("source"), *_times(keys))
 
 
-def _keys(tree: Mapping[str, Any], key: str, where: str) -> dict[str, Any]:
-    return subtree(tree.get(key, {}), f"columns.{key}", where)
+def _constant(keys: Keys, name: str, example: str) -> float:
+    text = keys.text(name, f"give a value with its unit, for example '{example}'")
+    found = quantity(text, "time" if example.endswith("ms") else "calcium", keys.name(name), keys.where, example)
+    # pCa is a logarithm: quantity leaves it alone.
+    return 10.0 ** (6.0 - float(text.split()[0])) if found.kind == "pCa" else found.value
+
+
+def _times(keys: Keys) -> tuple[float | None, float | None]:
+    begin, end = keys.values.get("begin"), keys.values.get("end")
+    if begin is None:
+        if end is not None:
+            raise UserError(f"{keys.where}: activation.end needs activation.begin, for example 'begin: 1 s'")
+        return None, None
+    if begin == NEVER:
+        return math.inf, math.inf
+    begin_s = keys.amount("begin", "time", "1 s", zero=True)
+    if end is None:
+        raise UserError(f"{keys.where}: activation.end is missing; give a time such as '2 s', or {FORCE_DROP}")
+    if end == FORCE_DROP:
+        return begin_s, None
+    end_s = keys.amount("end", "time", "2 s")
+    if begin_s is not None and end_s is not None and end_s <= begin_s:
+        raise UserError(
+            f"{keys.where}: activation goes from {begin_s:g} to {end_s:g} s; its end has to come after its begin"
+        )
+    return begin_s, end_s

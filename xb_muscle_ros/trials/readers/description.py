@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 from typing import NamedTuple
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.activation import CalciumTransient
-from xb_muscle_ros.trials.readers.units import Quantity, Unit
+from xb_muscle_ros.trials.readers.units import Quantity, Unit, finite
 
 # What a length may be the length of, the first by default.
 LENGTHS_OF = ("fibre", "half_sarcomere", "sarcomere")
 FACTS = ("pca", "amplitude_l0", "recovery_s")
-
-
 # Endings of files that tell a format and are no part of a name.
 ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc", ".mat", ".slc", ".mcap", ".db3")
 
@@ -56,7 +52,7 @@ class Activation(NamedTuple):
     end_s: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ImportMapping:
     """Everything that has to be known to make trials of one or more files.
 
@@ -71,7 +67,7 @@ class ImportMapping:
         activation: makes calcium of stimulation.
         trial: name of the trial, with ``{file}`` and ``{folder}`` as in ``fibre``.
         trial_column: a column of a table whose value tells its trials apart; None for one called so, if any.
-        decimal: decimal mark of a table, `numerals.POINT` or `numerals.COMMA`; None for what its cells show.
+        decimal: decimal mark of a table, `table.POINT` or `table.COMMA`; None for what its cells show.
         rate_hz: samples in a second, where there is no column of time.
         length_is_change: the length column holds the change from the reference length.
         length_of: what the length column is the length of, one of `LENGTHS_OF`; lengths of sarcomeres and halves of
@@ -84,7 +80,7 @@ class ImportMapping:
         f0_at_pca: F0 is the initial isometric force of the trial at this pCa in the same folder; None where not.
         f0_note: where F0 comes from, where that was found out rather than given.
         force_zero_from_slack: force is zero while the fibre is slack after a release.
-        pca, amplitude_l0, recovery_s: facts that hold for every file (-log10 M, L0, s).
+        facts: those of `FACTS` that hold for every file (-log10 M, L0, s).
         file_name: finds facts in file names by its groups ``pca``, ``amplitude_l0``, ``recovery_s``.
         factors: what a number found in the file name is multiplied with.
         isometric_fractions: isometric force of the matching isometric trials by pCa, F0; may be empty.
@@ -108,20 +104,25 @@ class ImportMapping:
     length_is_change: bool = False
     length_of: str = "fibre"
     reference_length: Quantity | None = None
-    at_reference: float | None = None
+    at_reference: Quantity | None = None
     largest_step_s: float | None = None
     servo_give: Quantity | None = None
     f0: Quantity | None = None
     f0_at_pca: float | None = None
     f0_note: str = ""
     force_zero_from_slack: bool = False
-    pca: float | None = None
-    amplitude_l0: float | None = None
-    recovery_s: float | None = None
+    facts: Mapping[str, float] = field(default_factory=dict)
     file_name: re.Pattern[str] | None = None
-    factors: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    isometric_fractions: Mapping[float, float] = field(default_factory=lambda: MappingProxyType({}))
+    factors: Mapping[str, float] = field(default_factory=dict)
+    isometric_fractions: Mapping[float, float] = field(default_factory=dict)
     isometric_source: str = ""
+
+    @property
+    def columns(self) -> dict[str, Column]:
+        """Where each signal is, by its name."""
+        stimulation = None if self.stimulation is None else self.stimulation.column
+        told = {"time": self.time, "length": self.length, "force": self.force, "calcium": self.calcium}
+        return {name: column for name, column in {**told, "stimulation": stimulation}.items() if column is not None}
 
     def facts_of(self, path: Path) -> dict[str, float | None]:
         """pCa, amplitude (L0) and recovery (s) of one file; what its name tells goes before what holds for all.
@@ -129,7 +130,7 @@ class ImportMapping:
         Raises:
             UserError: the file name does not match the pattern.
         """
-        facts: dict[str, float | None] = {name: getattr(self, name) for name in FACTS}
+        facts: dict[str, float | None] = {name: self.facts.get(name) for name in FACTS}
         if self.file_name is not None:
             match = self.file_name.search(name_of(path))
             if match is None:
@@ -142,18 +143,6 @@ class ImportMapping:
                     # 12 digits, so that 61 tenths are 6.1
                     facts[name] = float(f"{finite(text, name, str(path)) * self.factors.get(name, 1.0):.12g}")
         return facts
-
-    def fibre_of(self, path: Path) -> str:
-        """Name of the fibre a file is of."""
-        return filled(self.fibre, path)
-
-    def data_set_of(self, path: Path) -> str:
-        """Name of the data set a file belongs to."""
-        return filled(self.data_set, path)
-
-    def trial_of(self, path: Path) -> str:
-        """Name of the trial in a file; the begin of the names where it holds several."""
-        return filled(self.trial, path)
 
 
 def name_of(path: Path) -> str:
@@ -168,18 +157,3 @@ def name_of(path: Path) -> str:
 def filled(template: str, path: Path) -> str:
     """A name with ``{file}`` (see `name_of`) and ``{folder}`` put in."""
     return template.replace("{file}", name_of(path)).replace("{folder}", path.resolve().parent.name)
-
-
-def finite(value: object, key: str, where: str) -> float:
-    """A number.
-
-    Raises:
-        UserError: it is none, or not finite.
-    """
-    try:
-        number = float(value)  # type: ignore[arg-type]  # whatever it cannot take is told below
-    except (TypeError, ValueError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise UserError(f"{where}: {key} is {value!r}; needed is a finite number")
-    return number

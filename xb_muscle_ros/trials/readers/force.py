@@ -13,8 +13,8 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.phases import initial_isometric
+from xb_muscle_ros.trials.readers.base import Draft
 from xb_muscle_ros.trials.readers.description import ImportMapping
-from xb_muscle_ros.trials.readers.recording import Signal
 from xb_muscle_ros.trials.trial import Array, Phase
 
 # Beyond these it is no muscle's force, or its unit is wrong.
@@ -26,74 +26,53 @@ SLACK_PART = (0.6, 0.9)
 
 
 class Force(NamedTuple):
-    """Force (N; empty where not measured) at its times (s), the force that is F0 (N), notes and warnings."""
+    """Force (N; empty where not measured) at its times (s), and the force that is F0 (N)."""
 
     time_s: Array
     force_n: Array
     f0_n: float = 1.0
-    notes: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
 
 
-class Context(NamedTuple):
-    """What else is known of the trial when its force is read.
-
-    Attributes:
-        where: the trial, for messages.
-        time_s: the force's own times, s.
-        phases: of the trial.
-        pca: None where calcium changes.
-    """
-
-    where: str
-    time_s: Array
-    phases: tuple[Phase, ...]
-    pca: float | None
-
-
-def read_force(signal: Signal | None, mapping: ImportMapping, context: Context, scaling: bool | None) -> Force:
+def read_force(
+    draft: Draft, time_s: Array, phases: tuple[Phase, ...], pca: float | None, scaling: bool | None
+) -> Force:
     """Make force of the force column.
 
     Args:
-        signal: as the file has it; None where it has no force.
-        mapping: its unit, F0 and the isometric fractions.
-        context: see there.
+        draft: recording and mapping.
+        time_s: the force's own times, s.
+        phases: of the trial.
+        pca: None where calcium changes.
         scaling: scale to the isometric trial; None where the mapping has fractions.
 
     Raises:
         UserError: a force no muscle has, no slack to take zero from, or scaling that is wanted and cannot be done.
     """
-    where, column = context.where, mapping.force
-    if signal is None or column is None:
+    where, mapping, signal = draft.where, draft.mapping, draft.recording.signals.get("force")
+    if signal is None or mapping.force is None:
         if scaling:
             raise UserError(f"{where}: isometric scaling needs a force column; name it or leave the scaling out")
         return Force(np.empty(0), np.empty(0))
-    force = signal.values * column.unit.factor
-    notes: tuple[str, ...] = ()
+    force = signal.values * mapping.force.unit.factor
     if mapping.force_zero_from_slack:
-        zero = _slack_force(force, context)
+        zero = _slack_force(where, time_s, force, phases)
         force = force - zero
-        notes = (f"zero force is that of the slack fibre after its release, {zero:.6g} in the unit of the file",)
-    if mapping.f0 is None:
-        f0_n = 1.0
-        notes = (*notes, "forces come relative to F0 and are stored with 1 N for F0")
-    elif mapping.f0.kind == "stress":
-        force, f0_n = force / mapping.f0.value, 1.0
-        notes = (*notes, f"stress divided by F0 = {mapping.f0.value:.6g} Pa{mapping.f0_note}, stored with 1 N for F0")
+        how = "that of the slack fibre after its release"
+        draft.notes.append(f"zero force is {how}, {zero:.6g} in the unit of the file")
+    f0_n, f0 = 1.0, mapping.f0
+    if f0 is None:
+        draft.notes.append("forces come relative to F0 and are stored with 1 N for F0")
+    elif f0.kind == "stress":
+        force = force / f0.value
+        draft.notes.append(f"stress divided by F0 = {f0.value:.6g} Pa{mapping.f0_note}, stored with 1 N for F0")
     else:
-        f0_n = mapping.f0.value
-        notes = (*notes, f"F0 = {f0_n:.6g} N{mapping.f0_note}")
-    bad = np.flatnonzero(~((force >= FORCE_RANGE_F0[0] * f0_n) & (force <= FORCE_RANGE_F0[1] * f0_n)))
-    if bad.size:
-        i = int(bad[0])
-        raise UserError(
-            f"{signal.place(where, i)} is {force[i] / f0_n:.6g} F0; allowed is "
-            f"{FORCE_RANGE_F0[0]:g} to {FORCE_RANGE_F0[1]:g}; check its unit ({column.unit_name}) and f0"
-        )
-    made = Force(context.time_s, force, f0_n, notes)
-    if scaling is False or (scaling is None and not mapping.isometric_fractions):
-        return made
-    return _scaled(made, mapping, context)
+        f0_n = f0.value
+        draft.notes.append(f"F0 = {f0_n:.6g} N{mapping.f0_note}")
+    remedy = f"check its unit ({mapping.force.unit_name}) and f0"
+    signal.check(where, force / f0_n, FORCE_RANGE_F0, "{:.6g} F0", remedy)
+    if scaling or (scaling is None and mapping.isometric_fractions):
+        force = force * _scaling(draft, Force(time_s, force, f0_n), phases, pca)
+    return Force(time_s, force, f0_n)
 
 
 def isometric_force(force: Force, phases: tuple[Phase, ...]) -> float | None:
@@ -102,45 +81,45 @@ def isometric_force(force: Force, phases: tuple[Phase, ...]) -> float | None:
     return float(np.mean(initial)) if initial.size else None
 
 
-def _scaled(made: Force, mapping: ImportMapping, context: Context) -> Force:
-    where = context.where
-    fraction = _fraction(where, mapping, context.pca)
-    mean_n = isometric_force(made, context.phases)
+def _scaling(draft: Draft, force: Force, phases: tuple[Phase, ...], pca: float | None) -> float:
+    """What force is multiplied by, so that its initial isometric part is that of the isometric trial."""
+    where, mapping = draft.where, draft.mapping
+    fraction = _fraction(where, mapping, pca)
+    mean_n = isometric_force(force, phases)
     if mean_n is None:
-        warning = f"{where} does not begin isometrically; its force is not scaled to an isometric trial"
-        return made._replace(notes=(*made.notes, "not scaled to an isometric trial"), warnings=(warning,))
-    initial = mean_n / made.f0_n
+        draft.warnings.append(f"{where} does not begin isometrically; its force is not scaled to an isometric trial")
+        draft.notes.append("not scaled to an isometric trial")
+        return 1.0
+    initial = mean_n / force.f0_n
     if initial <= 0.0:
         raise UserError(
             f"{where}: the initial isometric force is {initial:.4g} F0; scaling it to {fraction:.4g} F0 needs one "
             "above 0; use --no-isometric-scaling"
         )
     factor = fraction / initial
-    note = f"force multiplied by {factor!r}, so that its initial isometric part is {fraction:.6g} F0"
-    if mapping.isometric_source:
-        note += f" ({mapping.isometric_source})"
-    warnings: tuple[str, ...] = ()
-    if not EXPECTED_SCALING[0] <= factor <= EXPECTED_SCALING[1]:
-        warnings = (
-            f"{where}: force was multiplied by {factor:.4g} to match the isometric trial; expected is "
-            f"{EXPECTED_SCALING[0]:g} to {EXPECTED_SCALING[1]:g}; check f0 and pCa",
+    source = f" ({mapping.isometric_source})" if mapping.isometric_source else ""
+    draft.notes.append(
+        f"force multiplied by {factor!r}, so that its initial isometric part is {fraction:.6g} F0{source}"
+    )
+    low, high = EXPECTED_SCALING
+    if not low <= factor <= high:
+        draft.warn(
+            f"force was multiplied by {factor:.4g} to match the isometric trial; expected is {low:g} to {high:g}; "
+            "check f0 and pCa"
         )
-    return made._replace(force_n=made.force_n * factor, notes=(*made.notes, note), warnings=warnings)
+    return factor
 
 
-def _slack_force(force: Array, context: Context) -> float:
+def _slack_force(where: str, time_s: Array, force: Array, phases: tuple[Phase, ...]) -> float:
     """Mean force of the slack between a release and what follows it."""
-    phases = context.phases
     for release, slack in itertools.pairwise(phases):
         if release.name == "release" and slack.name in ("hold", "recovery"):
             duration_s = slack.end_s - slack.start_s
             from_s, to_s = (slack.start_s + part * duration_s for part in SLACK_PART)
-            inside = force[(context.time_s >= from_s) & (context.time_s <= to_s)]
+            inside = force[(time_s >= from_s) & (time_s <= to_s)]
             if inside.size:
                 return float(np.mean(inside))
-    raise UserError(
-        f"{context.where}: no release leaves the fibre slack, so zero force is not known; use 'zero: as_recorded'"
-    )
+    raise UserError(f"{where}: no release leaves the fibre slack, so zero force is not known; use 'zero: as_recorded'")
 
 
 def _fraction(where: str, mapping: ImportMapping, pca: float | None) -> float:

@@ -17,17 +17,15 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.readers.base import Pending, begin_of
-from xb_muscle_ros.trials.readers.columns import FILE
-from xb_muscle_ros.trials.readers.description import Column, ImportMapping
-from xb_muscle_ros.trials.readers.recording import Recording, Signal
+from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal
+from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled
 from xb_muscle_ros.trials.trial import Array
 
 TEST_START_S = 0.005
 _STRUCT = "data"
 # Axes of the signals after that of samples: field of the struct, fact it tells, and factor to the fact's unit.
 _AXES = (("pCas", "pca", 1.0), ("ISIs", "recovery_s", 1e-3), ("AMPs", "amplitude_l0", 1e-4))
-_MAGIC = (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file")
+_SIGNALS = ("time", "length", "force")
 Cell = tuple[int, ...]
 
 
@@ -46,12 +44,12 @@ class _Data:
         return samples[: finite[-1] + 1] if finite.size else samples[:0]
 
 
-class MatReader:
+class MatReader(Reader):
     """Many trials to a file, which is one fibre."""
 
     name = "mat"
-    suffixes: tuple[str, ...] = (".mat",)
-    kind = FILE
+    suffixes = (".mat",)
+    begins = (b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file")
     defaults: Mapping[str, Any] = {
         "fibre": "{file}",
         "columns": {
@@ -60,10 +58,6 @@ class MatReader:
             "force": {"column": "Fexp", "unit": "F0"},
         },
     }
-
-    def matches(self, path: Path) -> bool:
-        """Whether the file begins or is called like one of MATLAB."""
-        return path.suffix.lower() in self.suffixes or begin_of(path, len(_MAGIC[0])) in _MAGIC
 
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
         """The measured cells of the file, pCa by pCa; the file is read whole, its trials are made one at a time.
@@ -76,7 +70,7 @@ class MatReader:
         for cell in itertools.product(*(range(axis.size) for axis in data.axes)):
             if all(data.values(column, cell).size for column in measured):
                 pca, recovery_ms, amplitude = (axis[i] for axis, i in zip(data.axes, cell, strict=True))
-                name = f"{mapping.trial_of(path)}_amp{amplitude:g}_rt{recovery_ms:g}ms_pca{10.0 * pca:.6g}"
+                name = f"{filled(mapping.trial, path)}_amp{amplitude:g}_rt{recovery_ms:g}ms_pca{10.0 * pca:.6g}"
                 yield Pending(name, partial(_recording, data, mapping, cell, name))
 
     def pca(self, path: Path, mapping: ImportMapping) -> None:
@@ -86,34 +80,32 @@ class MatReader:
 def _recording(data: _Data, mapping: ImportMapping, cell: Cell, name: str) -> Recording:
     where = f"{data.path}, trial {name}"
     facts = _facts(data, cell, where)
-    time, length = data.values(mapping.time, cell), data.values(mapping.length, cell)
-    force = None if mapping.force is None else data.values(mapping.force, cell)
-    if mapping.force is not None and force is not None and force.size != length.size:
+    found = {key: data.values(column, cell) for key, column in mapping.columns.items() if key in _SIGNALS}
+    time, length = found["time"], found["length"]
+    if mapping.force is not None and found["force"].size != length.size:
         raise UserError(
-            f"{where}: {mapping.length.name} has {length.size} samples, {mapping.force.name} {force.size}; needed are "
-            "equal numbers; mend the file"
+            f"{where}: {mapping.length.name} has {length.size} samples, {mapping.force.name} {found['force'].size}; "
+            "needed are equal numbers; mend the file"
         )
     warnings: tuple[str, ...] = ()
     if 0 < time.size < length.size:
         # The authors kept one record of times for all pCa.
         warnings = (f"{where}: {length.size} samples have {time.size} times; those without a time are left out",)
     count = min(time.size, length.size)
-
-    def signal(column: Column, values: Array) -> Signal:
-        return Signal(column.name, values[:count], lambda i: f"sample {i + 1}")
-
     shift = max(0.0, -float(time[0])) if count else 0.0
+    found["time"] = time + shift
     test_start_s = TEST_START_S + shift * mapping.time.unit.factor
     return Recording(
-        where=where,
-        trial=name,
-        time=signal(mapping.time, time + shift),
-        length=signal(mapping.length, length),
-        force=None if mapping.force is None or force is None else signal(mapping.force, force),
-        facts=facts,
-        notes=(f"time {TEST_START_S:g} s of the file is {test_start_s:.6g} s here",),
-        warnings=warnings,
-        test_start_s=test_start_s,
+        where,
+        name,
+        {
+            key: Signal(mapping.columns[key].name, values[:count], lambda i: f"sample {i + 1}")
+            for key, values in found.items()
+        },
+        facts,
+        (f"time {TEST_START_S:g} s of the file is {test_start_s:.6g} s here",),
+        warnings,
+        test_start_s,
     )
 
 
@@ -128,7 +120,7 @@ def _facts(data: _Data, cell: Cell, where: str) -> dict[str, float | None]:
 
 def _load(path: Path, mapping: ImportMapping) -> _Data:
     struct = _struct(path)
-    columns = [column for column in (mapping.time, mapping.length, mapping.force) if column is not None]
+    columns = [column for key, column in mapping.columns.items() if key in _SIGNALS]
     missing = [name for name in (*(c.name for c in columns), *(field for field, *_ in _AXES)) if name not in struct]
     if missing:
         raise UserError(

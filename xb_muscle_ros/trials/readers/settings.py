@@ -1,38 +1,36 @@
-"""All that an import was told, and the mapping it makes of that for each file."""
+"""The settings of an import, and the mapping they make for each file."""
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.trials.readers.assembly import trial_of
 from xb_muscle_ros.trials.readers.base import Reader
 from xb_muscle_ros.trials.readers.description import ImportMapping, name_of
+from xb_muscle_ros.trials.readers.force import Force, isometric_force
 from xb_muscle_ros.trials.readers.mapping import build_mapping
-from xb_muscle_ros.trials.readers.preparation import FoundF0, isometric_f0
 from xb_muscle_ros.trials.readers.registry import READERS, reader_for
-from xb_muscle_ros.trials.readers.tree import merged, subtree, text_at
+from xb_muscle_ros.trials.readers.tree import Keys, merged
+from xb_muscle_ros.trials.readers.units import Quantity
 
 # Raised when the same file and mapping would make another trial than before.
 VERSION = 2
 # Mappings, and F0 of preparations, that are kept: files come kind by kind and folder by folder.
 _KEPT = 64
+_SAME_PCA = 1e-6
 
 
 class MappingError(UserError):
     """The mapping is wrong, whatever the file; there is no use in going on with the next one."""
-
-
-class _Case(NamedTuple):
-    """Keys that hold for files whose name matches."""
-
-    files: re.Pattern[str]
-    tree: Mapping[str, Any]
 
 
 class Prepared(NamedTuple):
@@ -67,7 +65,7 @@ class ImportSettings:
         Raises:
             UserError: an unknown format, or ``per_file`` that cannot be used.
         """
-        rest = dict(tree)
+        rest = Keys(tree, where).values
         self._format = file_format or rest.pop("format", None)
         rest.pop("format", None)
         if self._format is not None and self._format not in READERS:
@@ -75,8 +73,8 @@ class ImportSettings:
         self._cases = _cases(rest.pop("per_file", []), where)
         self._tree, self._where, self._overrides = rest, where, overrides or {}
         self.isometric_scaling = isometric_scaling
-        self._mappings: dict[tuple[str, tuple[int, ...]], tuple[ImportMapping, str]] = {}
-        self._preparations: dict[tuple[Path, str, str], FoundF0 | None] = {}
+        self._mapping = functools.lru_cache(_KEPT)(self._built)
+        self._isometric_f0 = functools.lru_cache(_KEPT)(isometric_f0)
         if not self._cases and self._format is not None:
             self._mapping(READERS[self._format], ())
 
@@ -88,44 +86,32 @@ class ImportSettings:
             MappingError: the mapping does not fit its format.
         """
         reader = reader_for(path, self._format)
-        matching = tuple(i for i, case in enumerate(self._cases) if case.files.search(name_of(path)))
+        matching = tuple(i for i, (files, _) in enumerate(self._cases) if files.search(name_of(path)))
         mapping, digest = self._mapping(reader, matching)
-        if mapping.f0_at_pca is not None:
-            f0, note = self._f0(path, reader, mapping, digest, mapping.f0_at_pca)
-            mapping = replace(mapping, f0=f0, f0_note=note)
-            digest = hashlib.sha256(f"{digest} {f0.value!r} {note}".encode()).hexdigest()
-        return Prepared(path, reader, mapping, digest)
-
-    def _f0(self, path: Path, reader: Reader, mapping: ImportMapping, digest: str, pca: float) -> FoundF0:
-        folder, suffix = path.resolve().parent, path.suffix.lower()
-        key = (folder, suffix, digest)
-        if key not in self._preparations:
-            _make_room(self._preparations)
-            self._preparations[key] = isometric_f0(folder, suffix, reader, mapping, pca)
-        found = self._preparations[key]
+        if mapping.f0_at_pca is None:
+            return Prepared(path, reader, mapping, digest)
+        suffix = path.suffix.lower()
+        found = self._isometric_f0(path.resolve().parent, suffix, reader, mapping, mapping.f0_at_pca)
         if found is None:
             raise UserError(
-                f"{path}: no {suffix} file in its folder has an isometric force at pCa {pca:g}, so F0 is not known; "
-                "add that trial, or give f0 in the mapping or by --f0"
+                f"{path}: no {suffix} file in its folder has an isometric force at pCa {mapping.f0_at_pca:g}, so F0 is "
+                "not known; add that trial, or give f0 in the mapping or by --f0"
             )
-        return found
+        f0, note = found
+        digest = hashlib.sha256(f"{digest} {f0.value!r} {note}".encode()).hexdigest()
+        return Prepared(path, reader, replace(mapping, f0=f0, f0_note=note), digest)
 
-    def _mapping(self, reader: Reader, matching: tuple[int, ...]) -> tuple[ImportMapping, str]:
-        key = (reader.name, matching)
-        if key not in self._mappings:
-            tree = merged(reader.defaults, self._tree)
-            for i in matching:
-                tree = merged(tree, self._cases[i].tree)
-            tree = merged(tree, self._overrides)
-            told = json.dumps([VERSION, reader.name, self.isometric_scaling, _with_text_keys(tree)], sort_keys=True)
-            try:
-                made = build_mapping(tree, self._where, reader.kind)
-                _check_format(made, reader)
-            except UserError as problem:
-                raise MappingError(str(problem)) from None
-            _make_room(self._mappings)
-            self._mappings[key] = made, hashlib.sha256(told.encode()).hexdigest()
-        return self._mappings[key]
+    def _built(self, reader: Reader, matching: tuple[int, ...]) -> tuple[ImportMapping, str]:
+        """The mapping of files of a format that some of the cases match, and its digest."""
+        trees = (self._tree, *(self._cases[i][1] for i in matching), self._overrides)
+        tree = functools.reduce(merged, trees, dict(reader.defaults))
+        told = json.dumps([VERSION, reader.name, self.isometric_scaling, _with_text_keys(tree)], sort_keys=True)
+        try:
+            made = build_mapping(tree, self._where, reader.kind)
+            _check_format(made, reader)
+        except UserError as problem:
+            raise MappingError(str(problem)) from None
+        return made, hashlib.sha256(told.encode()).hexdigest()
 
 
 def _check_format(made: ImportMapping, reader: Reader) -> None:
@@ -145,24 +131,56 @@ def _with_text_keys(tree: object) -> object:
     return str(tree)
 
 
-def _make_room(kept: dict[Any, Any]) -> None:
-    if len(kept) >= _KEPT:
-        kept.clear()
-
-
-def _cases(told: object, where: str) -> tuple[_Case, ...]:
+def _cases(told: object, where: str) -> list[tuple[re.Pattern[str], Mapping[str, Any]]]:
+    """Keys that hold for files whose name matches; their nulls take keys out."""
     if not isinstance(told, list):
         raise UserError(f"{where}: per_file is {told!r}; needed is a list of keys, each with 'files'")
-    cases = []
-    for i, each in enumerate(told, 1):
-        tree = dict(subtree(each, f"per_file, entry {i},", where))
-        text = text_at(tree, "files", f"{where}: per_file, entry {i}", needed="give a regular expression of file names")
-        del tree["files"]
+    cases: list[tuple[re.Pattern[str], Mapping[str, Any]]] = []
+    for i, tree in enumerate(told, 1):
+        keys = Keys(tree, where, f"per_file, entry {i}")
+        files = keys.pattern("files", "give a regular expression of file names")
         nested = next((key for key in ("per_file", "format") if key in tree), None)
         if nested is not None:
-            raise UserError(f"{where}: per_file, entry {i} has {nested}; that holds for all files")
-        try:
-            cases.append(_Case(re.compile(text), tree))
-        except re.error as problem:
-            raise UserError(f"{where}: per_file, entry {i}: '{text}' is no regular expression: {problem}") from problem
-    return tuple(cases)
+            raise UserError(f"{where}: {keys.path} has {nested}; that holds for all files")
+        cases.append((files, {key: value for key, value in tree.items() if key != "files"}))
+    return cases
+
+
+def isometric_f0(
+    folder: Path, suffix: str, reader: Reader, mapping: ImportMapping, pca: float
+) -> tuple[Quantity, str] | None:
+    """F0 of the preparation whose files a folder holds, and its origin in words; None where no file tells it.
+
+    Args:
+        folder: of the preparation.
+        suffix: ending of its files.
+        reader: reads them.
+        mapping: of them; its F0 is not used.
+        pca: of the trial looked for. Where several have it, the largest force counts: a fibre runs down.
+    """
+    assert mapping.force is not None  # the mapping was checked
+    without_f0 = replace(mapping, f0=None, f0_at_pca=None)
+    found = [
+        (force, file.name)
+        for file in sorted(folder.iterdir())
+        if file.suffix.lower() == suffix and file.is_file()
+        for force in _forces(file, reader, without_f0, pca)
+    ]
+    force, name = max(found, key=lambda each: each[0], default=(0.0, ""))
+    if force <= 0.0:
+        return None
+    return Quantity(force, mapping.force.unit.kind), f", the initial isometric force at pCa {pca:g} in {name}"
+
+
+def _forces(file: Path, reader: Reader, mapping: ImportMapping, pca: float) -> Iterator[float]:
+    """Initial isometric forces of a file's trials at a pCa, of those that have one and can be read."""
+    with contextlib.suppress(UserError):  # a broken neighbour is told when its turn comes
+        found = reader.pca(file, mapping)
+        if found is not None and abs(found - pca) > _SAME_PCA:
+            return
+        for pending in reader.trials(file, mapping):
+            with contextlib.suppress(UserError):
+                trial = trial_of(pending.read(), mapping, file, isometric_scaling=False)
+                force = isometric_force(Force(trial.force_time_s, trial.force_n), trial.facts.phases)
+                if force is not None and trial.facts.pca is not None and abs(trial.facts.pca - pca) <= _SAME_PCA:
+                    yield force

@@ -1,23 +1,35 @@
-"""Trials from SLControl files: permeabilised fibres, with their calibrations in the header."""
+"""Trials from SLControl files (Campbell and Moss 2003): permeabilised fibres, with their calibrations in the header.
+
+A header of tags and values stands above columns of volts. Values are on a line of their own below a ``_TAG_``, or
+behind a name that ends with a colon, or, between ``_FILE_INFO_START_`` and ``_FILE_INFO_STOP_``, behind the name.
+Lengths come in µm, times in ms, calibrations per V.
+"""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.trials.readers.base import Pending, begin_of, by_columns
-from xb_muscle_ros.trials.readers.columns import FILE
-from xb_muscle_ros.trials.readers.description import Column, ImportMapping, name_of
-from xb_muscle_ros.trials.readers.recording import Recording, Signal
-from xb_muscle_ros.trials.readers.slc_file import MAGIC, SlcHeader, read_columns, read_header
+from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal
+from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled, name_of
+from xb_muscle_ros.trials.readers.table import number
 from xb_muscle_ros.trials.trial import Array
 
+MAGIC = b"SLCONTROL_DATA_FILE"
+# Columns after that of time, by the number of input channels.
+CHANNELS = {
+    4: ("force", "sl", "fl", "intensity"),
+    8: ("force", "fl", "fl_command", "stimulus", "light_intensity", "shutter", "wavelength_command", "spare"),
+}
+_DATA = "Data"
+_INFO = ("_FILE_INFO_START_", "_FILE_INFO_STOP_")
 # The motor is at rest at the begin; its mean position then is the length in the header.
 _REST_SAMPLES = 100
 # The header may name the rate another program was told; then the time column is right.
@@ -27,7 +39,151 @@ _NOTED = {"Species": "", "Muscle": "", "Temperature": " °C", "pH": " pH", "Drug
 _PCA_IN_NAME = re.compile(r"(\d\d)pCa", re.IGNORECASE)
 
 
-class SlcReader:
+@dataclass(frozen=True)
+class SlcHeader:
+    """What stands above the data.
+
+    Attributes:
+        path: the file.
+        info: what the experimenter noted (pCa, species, temperature, ...), by name.
+        values: everything else, by the name before the colon.
+        recorded: day and time, as in the file.
+        lines: how many lines the header takes, the one that says ``Data`` included.
+    """
+
+    path: Path
+    info: dict[str, str]
+    values: dict[str, str]
+    recorded: str
+    lines: int
+
+    def number(self, name: str) -> float:
+        """A number that has to be there.
+
+        Raises:
+            UserError: it is missing or no finite number.
+        """
+        text = self.values.get(name)
+        value = math.nan if text is None else number(text)
+        if not math.isfinite(value):
+            found = "is missing" if text is None else f"is '{text}'"
+            raise UserError(f"{self.path}: {name} {found} in the header; needed is a number; mend the header")
+        return value
+
+    def micrometres(self, name: str) -> float:
+        """A number whose name carries its unit, which has to be µm; the sign for µ depends on the file's encoding."""
+        match = next(filter(None, (re.fullmatch(re.escape(name) + r"_\((.*)m\)", each) for each in self.values)), None)
+        if match is None:
+            raise UserError(f"{self.path}: {name}_(µm) is missing in the header; needed is a number; mend the header")
+        key = match.group()
+        if match.group(1) not in ("µ", "μ", "u"):
+            raise UserError(f"{self.path}: {key} in the header is not in µm; that is the only unit known for it")
+        return self.number(key)
+
+    @property
+    def pca(self) -> float | None:
+        """The pCa as noted; None where it is not or is no number."""
+        value = number(self.info.get("pCa", ""))
+        return value if math.isfinite(value) else None
+
+    @property
+    def force_gain(self) -> float:
+        """What force was amplified by beside its calibration; 1 where nothing is noted."""
+        value = number(self.info.get("Force_gain", ""))
+        return value if math.isfinite(value) and value > 0.0 else 1.0
+
+
+def read_header(path: Path) -> SlcHeader:
+    """Read the header alone.
+
+    Raises:
+        UserError: the file cannot be read, or is none of SLControl.
+    """
+    try:
+        with path.open("rb") as file:
+            lines = []
+            for raw in file:
+                lines.append(_text(raw))
+                if lines[-1] == _DATA:
+                    break
+    except OSError as problem:
+        raise UserError(f"{path} cannot be read: {problem.strerror}; give an SLControl file") from problem
+    if not lines or lines[0] != MAGIC.decode() or lines[-1] != _DATA:
+        what = "is empty" if not lines else f"does not begin with {MAGIC.decode()}"
+        if lines and lines[0] == MAGIC.decode():
+            what = "ends within its header"
+        raise UserError(f"{path} {what}; needed is a whole SLControl file")
+    return _header(path, lines)
+
+
+def read_columns(header: SlcHeader) -> dict[str, Array]:
+    """Columns below the header by name, ``time`` in s and the others in V, shape (data points,) each.
+
+    Raises:
+        UserError: a cell that is no number, an unknown number of channels, or rows missing.
+    """
+    channels = int(header.number("No_of_input_channels")) if "No_of_input_channels" in header.values else 4
+    if channels not in CHANNELS:
+        known = " or ".join(map(str, CHANNELS))
+        raise UserError(f"{header.path} has {channels} input channels; known are files with {known}")
+    names = ("time", *CHANNELS[channels])
+    rows = header.path.read_bytes().split(b"\n")[header.lines :]
+    rows = rows[:-1] if rows and not rows[-1].strip() else rows
+    points = int(header.number("data_points")) if "data_points" in header.values else len(rows)
+    if len(rows) < points:
+        raise UserError(
+            f"{header.path} has {len(rows)} rows; its header tells of {points} data points, so it was cut short; "
+            "copy it again"
+        )
+    table = _numbers(header, rows[:points], names)
+    return {name: table[:, i] for i, name in enumerate(names)}
+
+
+def _numbers(header: SlcHeader, rows: list[bytes], names: tuple[str, ...]) -> Array:
+    cells = [row.split() for row in rows]
+    try:
+        table: Array = np.array(cells, dtype=np.float64)  # ragged rows and words are ValueErrors
+        if table.shape == (len(rows), len(names)):
+            return table
+    except ValueError:
+        pass
+    for i, row in enumerate(cells):
+        where = f"{header.path}, line {header.lines + i + 1}"
+        if len(row) != len(names):
+            raise UserError(f"{where} has {len(row)} cells; needed are {len(names)}: {', '.join(names)}")
+        for name, text in zip(names, (cell.decode("latin-1") for cell in row), strict=True):
+            if math.isnan(number(text)) and text.lower() != "nan":
+                raise UserError(f"{where}, column '{name}' holds '{text}'; needed is a number")
+    raise UserError(f"{header.path} has no rows below its header; copy it again")
+
+
+def _header(path: Path, lines: list[str]) -> SlcHeader:
+    info: dict[str, str] = {}
+    values: dict[str, str] = {}
+    recorded, inside, tag = "", False, ""
+    for line in lines[1:-1]:
+        if line in _INFO:
+            inside = line == _INFO[0]
+        elif inside:
+            name, _, value = line.partition(" ")
+            info[name] = value.strip()
+        elif ":" in line and tag != "_RECORD_TIME_":
+            name, _, value = line.partition(":")
+            values[name.strip()] = value.strip()
+        elif line:
+            recorded = line if tag == "_RECORD_TIME_" else recorded
+        tag = line if line.startswith("_") else tag
+    return SlcHeader(path, info, values, recorded, len(lines))
+
+
+def _text(raw: bytes) -> str:
+    try:
+        return raw.decode("utf-8").strip()
+    except UnicodeDecodeError:
+        return raw.decode("latin-1").strip()
+
+
+class SlcReader(Reader):
     """One trial to a file; the folder is the preparation.
 
     The column ``fl`` is fibre length in m by the header's calibration, from its length at the begin; ``force`` is in
@@ -36,8 +192,8 @@ class SlcReader:
     """
 
     name = "slc"
-    suffixes: tuple[str, ...] = (".slc",)
-    kind = FILE
+    suffixes = (".slc",)
+    begins = (MAGIC,)
     defaults: Mapping[str, Any] = {
         "fibre": "{folder}",
         "trial": "{folder}_{file}",
@@ -49,13 +205,9 @@ class SlcReader:
         "f0": {"isometric_at_pca": 4.5},
     }
 
-    def matches(self, path: Path) -> bool:
-        """Whether the file begins or is called like one of SLControl."""
-        return path.suffix.lower() in self.suffixes or begin_of(path, len(MAGIC)) == MAGIC
-
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
         """The one trial of the file."""
-        yield Pending(mapping.trial_of(path), lambda: _recording(path, mapping))
+        yield Pending(filled(mapping.trial, path), lambda: _recording(path, mapping))
 
     def pca(self, path: Path, mapping: ImportMapping) -> float | None:
         """As the header tells."""
@@ -72,8 +224,14 @@ def _recording(path: Path, mapping: ImportMapping) -> Recording:
             raise UserError(f"{path} has no channel '{column.name}'{suggest(column.name, channels)}")
         return Signal(f"column '{column.name}'", channels[column.name], lambda i: f"line {header.lines + i + 1}")
 
-    found = by_columns(str(path), mapping, signal, mapping.trial_of(path), _facts(header, mapping))
-    return replace(found, notes=_notes(header), warnings=_rate_warning(header, columns["time"]))
+    return Recording(
+        str(path),
+        filled(mapping.trial, path),
+        {key: signal(column) for key, column in mapping.columns.items()},
+        _facts(header, mapping),
+        _notes(header),
+        _rate_warning(header, columns["time"]),
+    )
 
 
 def _calibrated(header: SlcHeader, columns: dict[str, Array]) -> dict[str, Array]:

@@ -23,40 +23,20 @@ class Quantity(NamedTuple):
     kind: str
 
 
-UNITS = {
-    "s": Unit("time", 1.0),
-    "ms": Unit("time", 1e-3),
-    "us": Unit("time", 1e-6),
-    "Hz": Unit("rate", 1.0),
-    "kHz": Unit("rate", 1e3),
-    "m": Unit("length", 1.0),
-    "cm": Unit("length", 1e-2),
-    "mm": Unit("length", 1e-3),
-    "um": Unit("length", 1e-6),
-    "nm": Unit("length", 1e-9),
-    "L0": Unit("relative length", 1.0),
-    "%L0": Unit("relative length", 1e-2),
-    "N": Unit("force", 1.0),
-    "mN": Unit("force", 1e-3),
-    "uN": Unit("force", 1e-6),
-    "nN": Unit("force", 1e-9),
-    "Pa": Unit("stress", 1.0),
-    "kPa": Unit("stress", 1e3),
-    "MPa": Unit("stress", 1e6),
-    "mN/mm2": Unit("stress", 1e3),
-    "N/cm2": Unit("stress", 1e4),
-    "F0": Unit("relative force", 1.0),
-    "%F0": Unit("relative force", 1e-2),
-    "M": Unit("calcium", 1e6),
-    "mM": Unit("calcium", 1e3),
-    "uM": Unit("calcium", 1.0),
-    "nM": Unit("calcium", 1e-3),
+_FACTORS = {
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+    "rate": {"Hz": 1.0, "kHz": 1e3},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9},
+    "relative length": {"L0": 1.0, "%L0": 1e-2},
+    "force": {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9},
+    "stress": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "mN/mm2": 1e3, "N/cm2": 1e4},
+    "relative force": {"F0": 1.0, "%F0": 1e-2},
+    "calcium": {"M": 1e6, "mM": 1e3, "uM": 1.0, "nM": 1e-3},
     # A logarithm, hence no factor: whoever converts it has to know.
-    "pCa": Unit("pCa", math.nan),
-    "V": Unit("stimulation", 1.0),
-    "mV": Unit("stimulation", 1e-3),
-    "1": Unit("stimulation", 1.0),
+    "pCa": {"pCa": math.nan},
+    "stimulation": {"V": 1.0, "mV": 1e-3, "1": 1.0},
 }
+UNITS = {name: Unit(kind, factor) for kind, units in _FACTORS.items() for name, factor in units.items()}
 KINDS = {
     "time": ("time",),
     "rate": ("rate",),
@@ -65,6 +45,21 @@ KINDS = {
     "calcium": ("calcium", "pCa"),
     "stimulation": ("stimulation",),
 }
+
+
+def finite(value: object, key: str, where: str) -> float:
+    """A number.
+
+    Raises:
+        UserError: it is none, or not finite.
+    """
+    try:
+        number = float(value)  # type: ignore[arg-type]  # whatever it cannot take is told below
+    except (TypeError, ValueError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise UserError(f"{where}: {key} is {value!r}; needed is a finite number")
+    return number
 
 
 def unit_of(text: str, column: str, where: str) -> Unit:

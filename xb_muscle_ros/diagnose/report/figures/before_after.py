@@ -8,19 +8,19 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.diagnose.report.figures.common import (
-    DATA_LINE,
     DOTS,
-    LINES,
     WIDTH_MM,
     Array,
     Figure,
     by_activation,
     finite,
     key,
+    plot_force,
+    plot_residual,
     quiet_rows,
+    same_scale,
     shown_of,
     svg,
-    thinned,
     trial_labels,
     unique,
     wrapped,
@@ -33,6 +33,9 @@ from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure
 
 _TRIALS, _ROWS = 3, 24
 _TOP_MM, _ROW_MM, _SCATTER_MM = 68.0, 4.3, 70.0
+_DOTTED: Any = {
+    "color": MODEL, "linewidth": 0.9, "linestyle": (0, (1, 1.5)), "zorder": 0, "label": "benchmark",
+}  # fmt: skip
 # Fibres beyond these share the last mark.
 _MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 
@@ -80,8 +83,8 @@ def draw_before_after(d: Diagnosis, traces: Sequence[TrialTraces]) -> Figure | N
             _scatter(parts[1], d, rows)
         else:
             _pairs(parts[1], d, rows)
-        left = "" if many else shown_of(len(rows), total, "trials", "those with the largest error")
-        return Figure(svg(made), _caption(d, chosen, many) + left, "Force and its error before and after")
+        hidden = "" if many else shown_of(len(rows), total, "trials", "those with the largest error")
+        return Figure(svg(made), _caption(d, chosen, many) + hidden, "Force and its error before and after")
 
 
 def _caption(d: Diagnosis, chosen: Sequence[OfTrial], many: bool) -> str:
@@ -124,28 +127,19 @@ def _forces(part: Any, d: Diagnosis, chosen: Sequence[OfTrial], of: dict[Any, Tr
     from matplotlib.ticker import MaxNLocator
 
     axes = part.subplots(2, len(chosen), squeeze=False, sharex="col", height_ratios=(2.6, 1.3))
-    labels, limit, handles, count = trial_labels(d), 0.3, [], 1 + changed(d)
-    for column, row in zip(axes.T, chosen, strict=True):
+    labels, handles, count = trial_labels(d), [], 1 + changed(d)
+    for (top, bottom), row in zip(axes.T, chosen, strict=True):
         t = of[key(row)]
-        pair = _predicted(d, t)
-        if pair is None:
-            continue
-        top, bottom = column
-        handles += top.plot(*thinned(t.time_s, t.measured_f0), **DATA_LINE)
-        bottom.axhline(0.0, color="black", linewidth=0.5)
-        for values, look in zip(pair[:count], LINES[:count], strict=True):
-            handles += top.plot(*thinned(t.time_s, values), **look)
-            left = 100.0 * (t.measured_f0 - values)
-            bottom.plot(*thinned(t.time_s, left), **look)
-            limit = max([limit, *finite([np.nanmax(np.abs(left)) if np.any(np.isfinite(left)) else None])])
-        told = " → ".join(force(value, "") for value in errors(d, row)[:count])
-        top.set_title(f"{wrapped(labels[key(row)], 30, 1)}\nRMSD {told} % F$_0$", loc="left", fontsize=7)
+        models = (_predicted(d, t) or ())[:count]
+        handles += plot_force(top, t, models)
+        plot_residual(bottom, t, models)
+        rmsd = " → ".join(force(value, "") for value in errors(d, row)[:count])
+        top.set_title(f"{wrapped(labels[key(row)], 30, 1)}\nRMSD {rmsd} % F$_0$", loc="left", fontsize=7)
         top.yaxis.set_major_locator(MaxNLocator(4))
         bottom.yaxis.set_major_locator(MaxNLocator(3))
         bottom.xaxis.set_major_locator(MaxNLocator(5))
         bottom.set_xlabel("Time (s)")
-    for bottom in axes[1]:
-        bottom.set_ylim(-1.1 * limit, 1.1 * limit)
+    same_scale(axes[1], 0.33)
     axes[0][0].set_ylabel("Force (F$_0$)")
     axes[1][0].set_ylabel("Residual\n(% F$_0$)")
     part.legend(handles=unique(handles), loc="outside upper center", ncols=3, frameon=False)
@@ -167,13 +161,8 @@ def _pairs(part: Any, d: Diagnosis, rows: Sequence[OfTrial]) -> None:
                 handles += axis.plot([100.0 * x], [place], markersize=size, **look)
     for place, t in enumerate(rows, start=1):
         for x in finite([t.noise_sd_f0]):
-            handles += axis.plot(
-                [100.0 * x], [place], "|", color="black", markersize=6, linestyle="none", label="noise"
-            )
-    for x in _benchmark(d):
-        handles.append(
-            axis.axvline(100.0 * x, color=MODEL, linewidth=0.9, linestyle=(0, (1, 1.5)), zorder=0, label="benchmark")
-        )
+            handles += axis.plot(100.0 * x, place, "|", color="black", markersize=6, linestyle="none", label="noise")
+    handles += [axis.axvline(100.0 * x, **_DOTTED) for x in _benchmark(d)]
     axis.set_yticks(range(len(rows) + 1), ["all trials", *(labels[key(t)] for t in rows)], fontsize=7)
     axis.get_yticklabels()[0].set_fontweight("bold")
     axis.set_ylim(len(rows) + 0.6, -0.6)
@@ -193,17 +182,15 @@ def _scatter(part: Any, d: Diagnosis, rows: Sequence[OfTrial]) -> None:
     for k, name in enumerate(names):
         own = [i for i, t in enumerate(rows) if t.fibre == name]
         last = len(_MARKS) - 1
-        told = wrapped(name, 20, 1) if k < last or len(names) == last + 1 else f"{len(names) - last} more fibres"
+        label = wrapped(name, 20, 1) if k < last or len(names) == last + 1 else f"{len(names) - last} more fibres"
+        label = label if several else "trial"
         handles += axis.plot(
             pairs[own, 0], pairs[own, 1], _MARKS[min(k, last)], markersize=4, linestyle="none", markeredgewidth=0.8,
-            markerfacecolor=MODEL if k % 2 == 0 else "white", markeredgecolor=MODEL, label=told if several else "trial",
+            markerfacecolor=MODEL if k % 2 == 0 else "white", markeredgecolor=MODEL, label=label,
         )  # fmt: skip
     limit = 1.05 * float(pairs.max())
     handles += axis.plot([0.0, limit], [0.0, limit], color=SECOND, linestyle=(0, (4, 1.6)), label="no change")
-    for y in _benchmark(d):
-        handles.append(
-            axis.axhline(100.0 * y, color=MODEL, linewidth=0.9, linestyle=(0, (1, 1.5)), zorder=0, label="benchmark")
-        )
+    handles += [axis.axhline(100.0 * y, **_DOTTED) for y in _benchmark(d)]
     axis.set_xlim(0.0, limit)
     axis.set_ylim(0.0, limit)
     axis.set_aspect("equal")

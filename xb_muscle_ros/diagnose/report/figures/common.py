@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
 from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND
 
@@ -124,6 +125,28 @@ def thinned(time: Array, values: Array) -> tuple[Array, Array]:
             keep |= {int(first + np.nanargmin(part)), int(first + np.nanargmax(part))}
     chosen = np.array(sorted(keep))
     return time[chosen], values[chosen]
+
+
+def plot_force(axis: Any, t: TrialTraces, models: Iterable[Array]) -> list[Any]:
+    """Measured force and what base and, if given, answer make of it, F0; handles for a legend."""
+    handles = axis.plot(*thinned(t.time_s, t.measured_f0), **DATA_LINE)
+    for values, look in zip(models, LINES, strict=False):
+        handles += axis.plot(*thinned(t.time_s, values), **look)
+    return list(handles)
+
+
+def plot_residual(axis: Any, t: TrialTraces, models: Iterable[Array]) -> None:
+    """Measured less simulated force, % F0."""
+    axis.axhline(0.0, color="black", linewidth=0.5)
+    for values, look in zip(models, LINES, strict=False):
+        axis.plot(*thinned(t.time_s, 100.0 * (t.measured_f0 - values)), **look)
+
+
+def same_scale(axes: Any, least: float = 0.0) -> None:
+    """One scale around zero for all panels."""
+    most = max([least, *(abs(end) for axis in np.ravel(axes) for end in axis.get_ylim())])
+    for axis in np.ravel(axes):
+        axis.set_ylim(-most, most)
 
 
 def finite(values: Iterable[float | None]) -> list[float]:

@@ -38,8 +38,7 @@ def draw_fibres(d: Diagnosis) -> Figure | None:
         return None
     fibres = d.by_fibre[:_FIBRES]
     known = [c for c in d.components if c.by_fibre]
-    told = [c for c in known if max(_of_any(c)) >= _LEAST]
-    shown = told[:_COMPONENTS]
+    shown = [c for c in known if max(_of_any(c)) >= _LEAST][:_COMPONENTS]
     matrix_mm = 14.0 + _ROW_MM * len(shown)
     with figure(WIDTH_MM, matrix_mm + _DOTS_MM + 12.0) as made:
         heights = (matrix_mm, _DOTS_MM)
@@ -56,7 +55,7 @@ def draw_fibres(d: Diagnosis) -> Figure | None:
             "Top: inclusion probability of each component from the recordings of one fibre alone (shade and upper "
             f"number), and its held-out gain there{'' if upright else ' with standard error'} (lower number). "
             f"Heavy frame: {NAMED:g} or more. Bottom: held-out force RMSD of each fibre, base (open) and answer "
-            "(filled); squares, the fibre left out and predicted with effects as the others have them."
+            "(filled); squares, the held-out fibre, predicted with effects as the others have them."
             f"{shown_of(len(fibres), len(d.by_fibre), 'fibres', 'the first given')}"
             f"{shown_of(len(shown), len(known), 'candidates', 'the most probable')}"
         )
@@ -88,9 +87,9 @@ def _matrix(axis: Any, shown: Sequence[Component], fibres: Sequence[OfStudyFibre
                 continue
             colour = "white" if values[i, j] > _DARK else "black"
             axis.text(j, i - 0.17, say.probability(values[i, j]), ha="center", va="center", fontsize=7.5, color=colour)
-            told = say.gain(of[fibre.fibre].heldout_gain)
-            told = told if len(fibres) <= _ROOMY else told.split(" ")[0]
-            axis.text(j, i + 0.25, told, ha="center", va="center", fontsize=6.5, color=colour)
+            gain = say.gain(of[fibre.fibre].heldout_gain)
+            gain = gain if len(fibres) <= _ROOMY else gain.split(" ")[0]
+            axis.text(j, i + 0.25, gain, ha="center", va="center", fontsize=6.5, color=colour)
             if values[i, j] >= NAMED:
                 axis.add_patch(Rectangle((j - 0.47, i - 0.45), 0.94, 0.9, fill=False, edgecolor="black", linewidth=1.1))
     axis.set_yticks(range(len(shown)), [wrapped(say.title(c), 30) for c in shown], fontsize=7)
@@ -108,7 +107,7 @@ def _errors(axis: Any, fibres: Sequence[OfStudyFibre], models: int) -> list[Any]
         pair = [s.heldout_rmsd_f0 if unseen else s.train_rmsd_f0 for s in scores]
         handles += _pair(axis, k - (0.13 if row.left_out_rmsd_f0 else 0.0), pair[:models], "o", "")
         if row.left_out_rmsd_f0:
-            handles += _pair(axis, k + 0.13, row.left_out_rmsd_f0[:models], "s", ", fibre left out")
+            handles += _pair(axis, k + 0.13, row.left_out_rmsd_f0[:models], "s", ", held-out fibre")
     axis.set_ylim(0.0, 1.08 * axis.get_ylim()[1])
     axis.yaxis.set_major_locator(MaxNLocator(5))
     axis.set_ylabel(f"{'Held-out force' if unseen else 'Force'} RMSD (% F$_0$)")

@@ -1,0 +1,273 @@
+"""Plays trials through a running muscle node over DDS and records what it answers."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from rclpy.duration import Duration
+from sensor_msgs.msg import JointState
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.node.client.link import Link
+from xb_muscle_ros.node.client.wires import Sender, reliable
+from xb_muscle_ros.node.configuration import flat
+from xb_muscle_ros.node.rules import stamp_ns
+from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
+from xb_muscle_ros.trials.stamps import to_ns
+from xb_muscle_ros.trials.trial import Trial
+
+# Samples under way at once. Well below the depth of the queues, so that nothing is ever lost.
+_WINDOW = 20
+_HANDSHAKE_S = 1.0
+_FIND_S = 10.0
+_LOOK_EVERY_S = 0.2
+_LEAVE_S = 2.0
+
+
+def play_live(
+    trials: Sequence[Trial],
+    fibre: Fibre | None = None,
+    timeout_s: float = 10.0,
+    find_s: float = _FIND_S,
+    namespace: str = "",
+    domain_id: int | None = None,
+) -> list[Simulated]:
+    """Play trials one after the other through the muscle node of a namespace, which is in lockstep.
+
+    Every trial starts from a reset with the trial's own constants; calcium is delivered before the length that needs
+    it, so that the forces are those of an offline replay, bit for bit.
+
+    Args:
+        trials: all of the node's fibre.
+        fibre: parameters that the node must have; None leaves them to the node.
+        timeout_s: longest wait for one answer, s.
+        find_s: longest wait for the node to appear, s.
+        namespace: of the node.
+        domain_id: of ROS; None stands for that of the environment.
+
+    Returns:
+        One result per trial, in order.
+
+    Raises:
+        UserError: no node, not the right one, a refused parameter, or no answer.
+    """
+    if not trials:
+        return []
+    with Link("muscle_player", namespace, domain_id) as link:
+        name = trials[0].facts.fibre
+        model = f" -p model:={fibre.model}" if fibre is not None else ""
+        given = str(fibre.path) if fibre is not None and fibre.path is not None else name
+        command = f"muscle_node --ros-args -p fiber_file:={given}{model} -p mode:=lockstep"
+        player = _Player(link, name, timeout_s)
+        link.find(find_s, command)
+        _check(link, trials, fibre, command)
+        player.meet(find_s)
+        return [player.play(trial) for trial in trials]
+
+
+def _check(link: Link, trials: Sequence[Trial], fibre: Fibre | None, command: str) -> None:
+    state = link.state()
+    if state != "active":
+        raise UserError(f"node {link.peer} is {state}; activate it: ros2 lifecycle set {link.peer} activate")
+    wanted: dict[str, object] = {"mode": "lockstep"}
+    if fibre is not None:
+        wanted |= {n: v for n, v in flat(fibre).items() if not n.startswith(("source", "constants."))}
+    fibre_there = link.parameters(["fibre"])["fibre"]
+    for trial in trials:
+        if trial.facts.fibre != fibre_there:
+            raise UserError(
+                f"node {link.peer} has fibre {fibre_there}, trial {trial.facts.trial} is of fibre "
+                f"{trial.facts.fibre}; end the node and start another: {command}"
+            )
+    link.check(wanted, command)
+
+
+class _Player:
+    """Topics on one side, arrays on the other."""
+
+    def __init__(self, link: Link, fibre: str, timeout_s: float) -> None:
+        self._link = link
+        self._timeout_s = timeout_s
+        node = link.node
+        self._length, self._calcium = (Sender(node, f"muscle/{topic}", [fibre]) for topic in ("length", "calcium"))
+        self._inlets = [
+            node.create_subscription(JointState, "muscle/force", self._on_force, reliable()),
+            node.create_subscription(JointState, "muscle/moments", self._on_moments, reliable()),
+        ]
+        self._met = False
+        self._begin({}, 0)
+
+    def meet(self, timeout_s: float) -> None:
+        """Wait until both sides' topics know each other.
+
+        Raises:
+            UserError: they do not in time.
+        """
+        ends = (self._length.publisher, self._calcium.publisher)
+        if not self._link.wait_for(lambda: all(end.get_subscription_count() for end in ends), timeout_s):
+            raise UserError(f"node {self._link.peer} does not listen to {ends[0].topic_name}; check its remappings")
+
+    def _check_alone(self) -> None:
+        topics = [end.publisher.topic_name for end in (self._length, self._calcium)]
+
+        def others() -> int:
+            return sum(self._link.node.count_publishers(topic) - 1 for topic in topics)
+
+        # One that has just ended stays on the graph for a moment.
+        if not self._link.wait_for(lambda: others() == 0, _LEAVE_S):
+            raise UserError(
+                f"{' and '.join(topics)} have more publishers ({others()}); end them, or lockstep has two masters"
+            )
+
+    def play(self, trial: Trial) -> Simulated:
+        """Play one trial.
+
+        Calcium travels apart from length. Waiting until every calcium sample is acknowledged takes DDS seconds each, so
+        the trial is played without, the node then tells whether all of it came in time, and only if not the trial is
+        played again with waiting.
+        """
+        plan = _Plan.of(trial)
+        facts = trial.facts
+        self._check_alone()
+        self._link.set_parameters(
+            {"constants.reference_length_m": facts.reference_length_m, "constants.f0_n": facts.f0_n}
+        )
+        for wait in (False, True):
+            self._play(trial, plan, wait)
+            account = self._link.reset()
+            if account.calcium == self._sent_calcium and account.late == 0:
+                return Simulated(
+                    time_s=trial.time_s,
+                    force_n=self._force[:, 0],
+                    ce_length_m=self._force[:, 1],
+                    ce_velocity_m_per_s=self._force[:, 2],
+                    moments={name: self._moments[:, i] for i, name in enumerate(MOMENTS)},
+                )
+        raise UserError(
+            f"trial {facts.trial}: node {self._link.peer} took {account}; {self._sent_calcium} calcium samples were "
+            "sent; leave the machine more time, or end what else publishes calcium"
+        )
+
+    def _play(self, trial: Trial, plan: _Plan, wait: bool) -> None:
+        stamps = plan.stamps
+        self._begin({int(stamp): k for k, stamp in enumerate(stamps)}, stamps.size)
+        if wait:
+            # Nothing of an earlier attempt may arrive in the middle of this one.
+            self._wait_for_calcium(trial)
+        self._start(trial, plan, wait)
+        for first in range(1, stamps.size, _WINDOW):
+            window = range(first, min(first + _WINDOW, stamps.size))
+            self._send_calcium(trial, plan, sorted({int(i) for i in plan.held[first : window.stop]}), wait)
+            for k in window:
+                self._length.send(int(stamps[k]), trial.length_m[k])
+            self._await(window, trial, plan)
+
+    def _start(self, trial: Trial, plan: _Plan, wait: bool) -> None:
+        """Send the first sample, and again after a reset while the node's answers may not find their way yet."""
+
+        def send() -> None:
+            self._sent_calcium, self._newest_calcium = 0, -1
+            self._send_calcium(trial, plan, [int(plan.held[0])], wait)
+            self._length.send(int(plan.stamps[0]), trial.length_m[0])
+
+        patience = self._timeout_s if self._met else _HANDSHAKE_S
+        self._met = self._link.begin(send, lambda: bool(self._missing[0] == 0), self._timeout_s, patience)
+        if not self._met:
+            self._give_up(0, trial, plan)
+
+    def _begin(self, index: dict[int, int], samples: int) -> None:
+        self._index = index
+        self._force = np.full((samples, 3), np.nan)
+        self._moments = np.full((samples, len(MOMENTS)), np.nan)
+        # Per sample: 1 for the force, 2 for the moments still to come.
+        self._missing = np.full(samples, 3, dtype=np.int64)
+        # How many were sent since the last reset, and the index of the newest of them.
+        self._sent_calcium, self._newest_calcium = 0, -1
+
+    def _send_calcium(self, trial: Trial, plan: _Plan, needed: Sequence[int], wait: bool) -> None:
+        """Send calcium that was not sent yet, if wanted until the node has it."""
+        new = [i for i in needed if i > self._newest_calcium]
+        for i in new:
+            self._calcium.send(int(plan.calcium_stamps[i]), trial.calcium_um[i])
+            self._newest_calcium = i
+        self._sent_calcium += len(new)
+        if new and wait:
+            self._wait_for_calcium(trial)
+
+    def _wait_for_calcium(self, trial: Trial) -> None:
+        if not self._calcium.publisher.wait_for_all_acked(Duration(seconds=self._timeout_s)):
+            raise UserError(f"trial {trial.facts.trial}: node {self._link.peer} does not take calcium; is it running?")
+
+    def _await(self, window: range, trial: Trial, plan: _Plan) -> None:
+        missing = self._missing[window.start : window.stop]
+        end = time.monotonic() + self._timeout_s
+        before = int(missing.sum())
+        while before:
+            self._link.wait_for(lambda: not missing.any(), _LOOK_EVERY_S)
+            now = int(missing.sum())
+            if now < before:
+                end = time.monotonic() + self._timeout_s
+            elif time.monotonic() >= end:
+                self._give_up(window.start + int(np.flatnonzero(missing)[0]), trial, plan)
+            before = now
+
+    def _give_up(self, k: int, trial: Trial, plan: _Plan) -> None:
+        what = "force" if self._missing[k] & 1 else "moments"
+        raise UserError(
+            f"trial {trial.facts.trial}: node {self._link.peer} sent no {what} for the sample stamped "
+            f"{plan.stamps[k] * 1e-9:.9f} s within {self._timeout_s:g} s; its log says whether it refused the sample"
+        )
+
+    def _on_force(self, message: Any) -> None:
+        k = self._index.get(stamp_ns(message.header.stamp))
+        if k is not None:
+            self._force[k] = message.effort[0], message.position[0], message.velocity[0]
+            self._missing[k] &= ~1
+
+    def _on_moments(self, message: Any) -> None:
+        k = self._index.get(stamp_ns(message.header.stamp))
+        if k is not None:
+            self._moments[k] = message.position
+            self._missing[k] &= ~2
+
+
+class _Plan(NamedTuple):
+    """A trial as it travels: stamps in ns, and the index of the calcium that acts in the step to each sample."""
+
+    stamps: npt.NDArray[np.int64]
+    calcium_stamps: npt.NDArray[np.int64]
+    held: npt.NDArray[np.intp]
+
+    @classmethod
+    def of(cls, trial: Trial) -> _Plan:
+        """Plan of a trial.
+
+        Raises:
+            UserError: no samples, stamps that do not ascend, or no calcium at the first sample.
+        """
+        stamps = _stamps(trial.time_s, trial, "length")
+        calcium_stamps = _stamps(trial.calcium_time_s, trial, "calcium")
+        starts = np.concatenate([stamps[:1], stamps[:-1]])
+        held = np.searchsorted(calcium_stamps, starts, side="right") - 1
+        if stamps.size == 0 or held[0] < 0:
+            raise UserError(
+                f"trial {trial.facts.trial}: no calcium is known at its first length sample; "
+                "give the calcium that the fibre starts with"
+            )
+        return cls(stamps, calcium_stamps, held)
+
+
+def _stamps(time_s: npt.NDArray[np.float64], trial: Trial, what: str) -> npt.NDArray[np.int64]:
+    """Times as whole ns, as they travel."""
+    stamps: npt.NDArray[np.int64] = to_ns(time_s)
+    if np.any(np.diff(stamps) <= 0):
+        k = int(np.flatnonzero(np.diff(stamps) <= 0)[0]) + 1
+        raise UserError(f"trial {trial.facts.trial}: {what} stamps do not ascend at {time_s[k]:.9f} s; mend the trial")
+    return stamps

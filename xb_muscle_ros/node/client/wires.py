@@ -1,0 +1,41 @@
+"""Samples on their way to a muscle node: one value for each of its fibres."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rclpy.qos import QoSProfile, QoSReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+from xb_muscle_ros.node.outputs import array, set_stamp
+from xb_muscle_ros.node.stepping import Floats
+
+
+def reliable() -> QoSProfile:
+    """Quality of service with which nothing gets lost, in a queue of 100."""
+    return QoSProfile(depth=100, reliability=QoSReliabilityPolicy.RELIABLE)
+
+
+class Sender:
+    """A publisher of ``muscle/length`` or ``muscle/calcium``, whose message is filled in place.
+
+    Attributes:
+        publisher: of rclpy.
+    """
+
+    def __init__(self, node: Any, topic: str, fibres: Sequence[str], qos: Any = None) -> None:
+        """Publish on a topic; without names for a node of one fibre. `qos` as for rclpy; None: reliable."""
+        self.publisher = node.create_publisher(JointState, topic, reliable() if qos is None else qos)
+        self._message = JointState(name=list(fibres))
+        self._position = array(self._message, "position", max(len(fibres), 1))
+
+    def send(self, stamp_ns: int, values: Floats | float, velocity: Floats | None = None) -> None:
+        """Publish values of the fibres, shape (fibres,), or one for all, and velocities where there are any."""
+        set_stamp(self._message, stamp_ns)
+        self._position[:] = values
+        if velocity is not None or self._message.velocity:
+            self._message.velocity = [] if velocity is None else velocity.tolist()
+        self.publisher.publish(self._message)
