@@ -13,7 +13,7 @@ from made_trials import FIBRE, given_fibre
 
 from xb_muscle_ros.diagnose import notes
 from xb_muscle_ros.diagnose.effort import QUICK, Effort
-from xb_muscle_ros.diagnose.names import Name
+from xb_muscle_ros.diagnose.names import MECHANISMS, Name
 from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 from xb_muscle_ros.scores.noise.model import Source
@@ -112,7 +112,7 @@ def test_the_order_that_run_down_counts_and_force_that_never_changes_are_said() 
 def test_what_could_not_be_tried_is_said_and_long_lists_are_cut() -> None:
     (line,) = notes.of_search([(Name.PHOSPHATE, Name.PCA_SHIFT)], [])
     assert line == "sets for which the model had no solution, not tried further: phosphate + pca_shift"
-    (line,) = notes.of_search([(name,) for name in list(Name)[:9]], [])
+    (line,) = notes.of_search([(name,) for name in MECHANISMS[:9]], [])
     assert line.endswith(" and 3 more")
     (line,) = notes.of_search([], ["series_compliance"])
     assert line.endswith(": series_compliance")

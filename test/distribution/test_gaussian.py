@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad, trapezoid
 
 from xb_muscle_ros.distribution.gaussian import Gaussian
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import ExponentialRate, GaussianSpread, Quantities, StepRate
+from xb_muscle_ros.mechanisms import ExponentialRate, GaussianSpread, Quantities, StepRate, ops
 
 
 @given(

@@ -6,8 +6,7 @@ import math
 
 import pytest
 
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import GaussianSpread, Quantities, StepRate
+from xb_muscle_ros.mechanisms import GaussianSpread, Quantities, StepRate, ops
 from xb_muscle_ros.mechanisms.detachment.forcible import ForcibleDetachment
 from xb_muscle_ros.mechanisms.parallel.softplus import SoftplusParallel
 from xb_muscle_ros.mechanisms.series.exponential import ExponentialSeries

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from xb_muscle_ros.mechanisms import Contractile, Quantities
 from xb_muscle_ros.mechanisms.activation.sigmoid import SigmoidActivation
-from xb_muscle_ros.mechanisms.base import Contractile, Quantities
 from xb_muscle_ros.mechanisms.force_velocity.logarithmic import LogarithmicForceVelocity
 from xb_muscle_ros.mechanisms.series.exponential import ExponentialSeries
 from xb_muscle_ros.mechanisms.series.rigid import RigidSeries

@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from xb_muscle_ros.bench.c_code import c_text
 from xb_muscle_ros.errors import StateViolation
 from xb_muscle_ros.models.assembly import equations
-from xb_muscle_ros.models.codegen import c_text, module_text
 from xb_muscle_ros.models.elimination import Elimination
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
@@ -104,7 +104,7 @@ def test_c_text_computes_the_same(muscle: Muscle, tmp_path: Path) -> None:
 
 def test_text_is_the_same_every_time() -> None:
     """Other processes find the compiled model by a hash of its sources: the same sources must give the same code."""
-    assert module_text(compose("3state_coop"), False) == module_text(compose("3state_coop"), False)
+    assert compose("3state_coop").module_text(False) == compose("3state_coop").module_text(False)
 
 
 def test_violation_names_fibre_state_value_and_time(muscle: Muscle) -> None:

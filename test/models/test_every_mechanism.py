@@ -16,7 +16,6 @@ from mechanism_effects import EFFECT
 from uncompiled import Uncompiled
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.models.codegen import module_text
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.parameters import complete
 from xb_muscle_ros.models.registry import EXTRAS, METHODS, SWAPS, compose, split_set, with_mechanisms
@@ -91,7 +90,7 @@ def test_strain_grids_differ_in_their_remap_alone(name: str) -> None:
     """What holds for the code of one of them holds for all: `test_contract` compiles each with the bare models."""
 
     def body(method: str) -> list[str]:
-        lines = module_text(compose(name, method), True).splitlines()
+        lines = compose(name, method).module_text(True).splitlines()
         return [line for line in lines if not line.startswith(('"""Generated', "regrid = ", "N_OTHERS", "BINS"))]
 
     bodies = [body(method) for method in GRIDS]

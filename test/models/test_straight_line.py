@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from numba import njit
 
-from xb_muscle_ros.models.codegen import module_text
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.registry import compose
 from xb_muscle_ros.models.straight_line import straight_line
@@ -87,7 +86,7 @@ def test_what_is_no_straight_line_is_refused_by_name(tmp_path: Path) -> None:
 def test_a_models_steps_are_what_numba_makes_of_them(tmp_path: Path) -> None:
     """The same text, once with straight lines for LLVM and once all for Numba: every state and output to the bit."""
     composition = compose("3state_coop")
-    text = module_text(composition, False).replace("cache=True, ", "")
+    text = composition.module_text(False).replace("cache=True, ", "")
     plain = text.replace("@straight_line", "@njit(error_model='numpy')").replace("\ndef rates(", "\n@njit\ndef rates(")
     values = load_fibre("18Dec2017a").values | {"smoothing": 0.0}
     p = np.array([values[row.name] for row in composition.parameters])

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.models.codegen import module_text
 from xb_muscle_ros.models.composition import Model
 from xb_muscle_ros.models.muscle import GUARD, SCRATCH_ROWS
 from xb_muscle_ros.symbolic import intrinsics
@@ -46,7 +45,7 @@ def uncompiled(model: Model, smooth: bool) -> SimpleNamespace:
     Raises:
         NameError: on a call, where the text names what compiled modules do not have.
     """
-    text = module_text(model, smooth)
+    text = model.module_text(smooth)
     head, _, body = text.partition("\nOK, NOT_FINITE")
     names = head.rpartition("import (")[2].partition(")")[0].replace(",", " ").split()
     scope: dict[str, Any] = {name: getattr(intrinsics, name) for name in names}

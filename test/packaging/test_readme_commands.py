@@ -37,3 +37,16 @@ def test_the_copy_leaves_out_what_is_built(program: dict[str, Any], tmp_path: Pa
     assert (copy / "package.xml").is_file()
     assert (copy / "scripts" / "demo").stat().st_mode & 0o100
     assert not (copy / ".git").exists()
+
+
+def test_what_a_block_exports_is_there_in_the_next_one(program: dict[str, Any], tmp_path: Path) -> None:
+    exported = tmp_path / "exported"
+    first = program["Block"](1, "export MINE='a b'\nunset NOTHING\n", "")
+    second = program["Block"](5, 'test "$MINE" = "a b"\n', "")
+    assert [program["run"](block, tmp_path, exported) for block in (first, second)] == [0, 0]
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs" / "tutorials").glob("*.md")), ids=lambda page: page.name)
+def test_tutorials_have_commands_to_run(program: dict[str, Any], page: Path) -> None:
+    found = program["blocks"](page.read_text(encoding="utf-8"))
+    assert any(not block.reason for block in found)

@@ -42,9 +42,9 @@ def said(verdict: str, stated: dict[str, float], **more: Any) -> dict[str, Any]:
     """A row of results: components by name with their probabilities; a family's name stands for its members."""
     rows = []
     for name, probability in sorted(stated.items(), key=lambda item: -item[1]):
-        known = name in {member.value for member in Name}
+        known = name in FAMILY
         family = FAMILY[Name(name)] if known else name
-        members = [name] if known else [member.value for member in Name if FAMILY[member] == name]
+        members = [name] if known else [member.value for member in FAMILY if FAMILY[member] == name]
         artefact = Name(members[0]) in (Name.PCA_SHIFT, Name.FORCE_DRIFT, Name.FORCE_OFFSET, Name.RUN_DOWN)
         rows.append(
             {

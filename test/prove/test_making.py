@@ -49,7 +49,7 @@ def test_case_follows_from_its_seed(case: Single) -> None:
 
 def test_case_tells_nothing_but_what_was_recorded(case: Single, tmp_path: Path) -> None:
     write_case(tmp_path / "case_0001", case, "fibre_0001", "gaussian")
-    words = [name.value for name in Name] + [label.removeprefix("outside:") for label in OUTSIDE]
+    words = [name.value for name in (*MECHANISMS, *MEASUREMENT)] + [label.removeprefix("outside:") for label in OUTSIDE]
     words += ["single", "outside", "conceal", "effect", case.fibre, '"scale"']
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert len(files) == 15

@@ -14,8 +14,9 @@ import pytest
 import work_tasks
 from conftest import DaskCluster, wait_until
 
+from xb_muscle_ros import plugins
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.work import Options, TaskFailed, run, scheduler, stream
+from xb_muscle_ros.work import Options, TaskFailed, identity, run, scheduler, stream
 from xb_muscle_ros.work import cluster as cluster_module
 
 
@@ -177,3 +178,35 @@ def test_without_dask(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(UserError, match=r"--scheduler needs Dask.*pip install 'xb_muscle_ros\[dask\]'"):
         run(work_tasks.process, [0], Options(scheduler="127.0.0.1:8786"))
+
+
+MINE = """
+from xb_muscle_ros.mechanisms import Entry, Extra, Parameter
+
+
+class MyDrag(Extra):
+    name = "my_drag_of_mine"
+    parameters = (Parameter("my_drag", "F0 s/L0", "drag", 0.0, 10.0, 0.0, "this test"),)
+    entry = Entry("mine", "my drag", "a drag of my own", "my_drag", 0.02, starts=({"my_drag": 0.01},))
+
+    def force(self, q):
+        return q.my_drag * q.velocity
+"""
+
+
+def test_mechanisms_from_outside_go_along_to_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "mine.py").write_text(MINE, encoding="utf-8")
+    workers = DaskCluster(tmp_path)
+    try:
+        monkeypatch.setenv(plugins.VARIABLE, str(tmp_path / "mine"))
+        identity.environment.cache_clear()
+        for options in (Options(scheduler=workers.address), Options(processes=2)):
+            assert run(work_tasks.last_mechanism, range(4), options) == ["my_drag_of_mine"] * 4
+        monkeypatch.delenv(plugins.VARIABLE)
+        identity.environment.cache_clear()
+        with pytest.raises(UserError, match=r"has mechanisms from outside \w{16} instead of none; .* start them anew$"):
+            run(work_tasks.last_mechanism, range(4), Options(scheduler=workers.address))
+    finally:
+        identity.environment.cache_clear()
+        workers.close()

@@ -110,3 +110,10 @@ def nested(numbers: list[float]) -> list[float]:
 def third(number: float) -> float:
     """A third."""
     return number / 3.0
+
+
+def last_mechanism(_: int) -> str:
+    """Name of the last mechanism that this process knows of."""
+    from xb_muscle_ros.models.registry import EXTRAS
+
+    return list(EXTRAS)[-1]

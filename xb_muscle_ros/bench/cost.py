@@ -102,14 +102,14 @@ class Study:
         muscle = Muscle(_fibre(self.fibre, method, bins, strain_range))
         start = muscle.settle(0.0, self.calcium)
         dt = np.diff(self.time_s)
-        seconds = []
+        seconds, counts = [], list[int]()
         for _ in range(self._repeats):
             begin = time.perf_counter()
-            states, steps = muscle.run_counted(start, dt, self.length, self.held, every=10)
+            states = muscle.run(start, dt, self.length, self.held, every=10, counts=counts)
             seconds.append(time.perf_counter() - begin)
         force = muscle.outputs_of(states)["force_f0"]
         taken = float(np.median(seconds))
-        return Point(method, bins, strain_range, series, _EVALUATIONS * steps, taken, self._error(force))
+        return Point(method, bins, strain_range, series, _EVALUATIONS * counts[-1], taken, self._error(force))
 
     def variable(self, tolerance: float) -> Point:
         """The Gaussian form with variable steps."""
@@ -118,15 +118,15 @@ class Study:
         sample = self.time_s[::10]
         sample = np.minimum(sample, self.corner_s[-1])
         corner_calcium = np.full(self.corner_s.size, self.calcium)
-        seconds = []
+        seconds, counts = [], list[int]()
         for _ in range(4 * self._repeats):
             begin = time.perf_counter()
-            states, steps = muscle.follow_counted(
-                start, self.corner_s, self.corner_l0, corner_calcium, sample, tolerance
+            states = muscle.follow(
+                start, self.corner_s, self.corner_l0, corner_calcium, sample, tolerance, counts=counts
             )
             seconds.append(time.perf_counter() - begin)
         error = self._error(muscle.outputs_of(states)["force_f0"])
-        return Point("gaussian", 0, 0.0, "variable", _EVALUATIONS * steps, float(np.median(seconds)), error)
+        return Point("gaussian", 0, 0.0, "variable", _EVALUATIONS * counts[-1], float(np.median(seconds)), error)
 
     def points(self) -> Iterator[Point]:
         """All points, cheapest method first."""

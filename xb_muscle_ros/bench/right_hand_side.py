@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from xb_muscle_ros.bench.c_code import c_text
 from xb_muscle_ros.bench.measure import Figure, timed
-from xb_muscle_ros.models.codegen import c_text
 from xb_muscle_ros.models.muscle import Array, Muscle
 from xb_muscle_ros.models.registry import compose
 

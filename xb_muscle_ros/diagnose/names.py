@@ -1,47 +1,70 @@
-"""Names of everything that a diagnosis may answer, and which of them data can hardly tell apart.
+"""Names of what a diagnosis may answer, known without any model: the blind benchmark draws its effects from them.
 
-The families were laid down before any concealed data were diagnosed: members act on the same thing in nearly the same
-way, so that naming the family is worth something even where the member cannot be told.
+Mechanisms name themselves, with their family, beside their equations; those of the benchmark stand here once more, in
+the order in which a diagnosis lists them, so that its generator has them without importing a model. A mechanism that
+is not among them comes after these: see `answers`. The families were laid down before any concealed data were
+diagnosed: members act on the same thing in nearly the same way, so that naming the family is worth something even
+where the member cannot be told.
 """
 
 from __future__ import annotations
 
-import enum
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import ClassVar
 
 
-class Name(str, enum.Enum):
-    """Mechanisms, then faults of the measurement."""
+class Name(str):
+    """Name of a mechanism or of a measurement artefact: a text, the same object wherever it is the same text."""
 
-    VISCOUS_DRAG = "viscous_drag"
-    PASSIVE_VISCOELASTICITY = "passive_viscoelasticity"
-    WEAKLY_BOUND_HEADS = "weakly_bound_heads"
-    FILAMENT_FRICTION = "filament_friction"
-    ACTIVE_TITIN = "active_titin"
-    STATIC_CALCIUM_STIFFNESS = "static_calcium_stiffness"
-    LENGTH_DEPENDENT_ACTIVATION = "length_dependent_activation"
-    LATTICE_SPACING = "lattice_spacing"
-    FILAMENT_OVERLAP = "filament_overlap"
-    STRAIN_RECRUITED_HEADS = "strain_recruited_heads"
-    PERSISTENT_THICK_FILAMENT = "persistent_thick_filament"
-    FORCIBLE_DETACHMENT = "forcible_detachment"
-    NONLINEAR_CROSSBRIDGE = "nonlinear_crossbridge"
-    HALF_SARCOMERE_SPREAD = "half_sarcomere_spread"
-    SERIES_COMPLIANCE = "series_compliance"
-    THIN_FILAMENT_COOPERATIVITY = "thin_filament_cooperativity"
-    THICK_FILAMENT_COOPERATIVITY = "thick_filament_cooperativity"
-    TEMPERATURE = "temperature"
-    PHOSPHATE = "phosphate"
-    PCA_SHIFT = "pca_shift"
-    RUN_DOWN = "run_down"
-    FORCE_OFFSET = "force_offset"
-    FORCE_DRIFT = "force_drift"
-    LENGTH_GAIN = "length_gain"
-    TIME_SHIFT = "time_shift"
-    TRANSDUCER_LAG = "transducer_lag"
+    __slots__ = ()
+    _made: ClassVar[dict[str, Name]] = {}
+
+    def __new__(cls, text: str) -> Name:
+        """The one name of a text."""
+        return cls._made.setdefault(text, super().__new__(cls, text))
+
+    @property
+    def value(self) -> str:
+        """The plain text."""
+        return str.__str__(self)
+
+    VISCOUS_DRAG: ClassVar[Name]
+    PASSIVE_VISCOELASTICITY: ClassVar[Name]
+    WEAKLY_BOUND_HEADS: ClassVar[Name]
+    FILAMENT_FRICTION: ClassVar[Name]
+    ACTIVE_TITIN: ClassVar[Name]
+    STATIC_CALCIUM_STIFFNESS: ClassVar[Name]
+    LENGTH_DEPENDENT_ACTIVATION: ClassVar[Name]
+    LATTICE_SPACING: ClassVar[Name]
+    FILAMENT_OVERLAP: ClassVar[Name]
+    STRAIN_RECRUITED_HEADS: ClassVar[Name]
+    PERSISTENT_THICK_FILAMENT: ClassVar[Name]
+    FORCIBLE_DETACHMENT: ClassVar[Name]
+    NONLINEAR_CROSSBRIDGE: ClassVar[Name]
+    HALF_SARCOMERE_SPREAD: ClassVar[Name]
+    SERIES_COMPLIANCE: ClassVar[Name]
+    THIN_FILAMENT_COOPERATIVITY: ClassVar[Name]
+    THICK_FILAMENT_COOPERATIVITY: ClassVar[Name]
+    TEMPERATURE: ClassVar[Name]
+    PHOSPHATE: ClassVar[Name]
+    PCA_SHIFT: ClassVar[Name]
+    RUN_DOWN: ClassVar[Name]
+    FORCE_OFFSET: ClassVar[Name]
+    FORCE_DRIFT: ClassVar[Name]
+    LENGTH_GAIN: ClassVar[Name]
+    TIME_SHIFT: ClassVar[Name]
+    TRANSDUCER_LAG: ClassVar[Name]
 
 
+for _attribute in Name.__annotations__:
+    if _attribute.isupper():
+        setattr(Name, _attribute, Name(_attribute.lower()))
+_ALL = tuple(Name._made.values())
+MECHANISMS: tuple[Name, ...] = _ALL[: _ALL.index(Name.PCA_SHIFT)]
+"""Names that are physics."""
+MEASUREMENT: tuple[Name, ...] = _ALL[len(MECHANISMS) :]
+"""Names that are measurement artefacts: the rows of `measurement.artefacts.ARTEFACTS`."""
 _FAMILIES: Mapping[str, tuple[Name, ...]] = {
     "parallel_viscoelasticity": (Name.VISCOUS_DRAG, Name.PASSIVE_VISCOELASTICITY),
     "weak_binding": (Name.WEAKLY_BOUND_HEADS, Name.FILAMENT_FRICTION),
@@ -67,7 +90,3 @@ FAMILY: Mapping[Name, str] = MappingProxyType(
     {name: family for family, members in _FAMILIES.items() for name in members}
 )
 """Family of every name."""
-MECHANISMS: tuple[Name, ...] = tuple(Name)[: tuple(Name).index(Name.PCA_SHIFT)]
-"""Names that are physics."""
-MEASUREMENT: tuple[Name, ...] = tuple(Name)[len(MECHANISMS) :]
-"""Names that are faults of the measurement: the rows of `measurement.artefacts.ARTEFACTS`."""

@@ -9,11 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.diagnose import notes, outside
+from xb_muscle_ros.diagnose.answers import MECHANISMS
 from xb_muscle_ros.diagnose.component import Component
 from xb_muscle_ros.diagnose.effort import Effort
 from xb_muscle_ros.diagnose.inference.answer import answer_of, components, verdict_of
 from xb_muscle_ros.diagnose.inference.shares import explained
-from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
+from xb_muscle_ros.diagnose.names import MEASUREMENT
 from xb_muscle_ros.diagnose.next_experiment import scaled
 from xb_muscle_ros.diagnose.noise.closure import by_distribution
 from xb_muscle_ros.diagnose.noise.residuals import Around
@@ -252,5 +253,5 @@ def _notes(study: Searched, chosen: Names, effort: Effort) -> list[str]:
         ]
         lines += [f"fibre {study.fibres[i].name}: {line}" if several else line for line in own]
     allowed = set.intersection(*(set(beside(f)) for f in study.fibres))
-    left_out = [n.value for n in Name if n not in MEASUREMENT and n not in allowed]
+    left_out = [n.value for n in MECHANISMS if n not in allowed]
     return [*lines, *notes.of_search(study.explorer.unsolved, left_out)]

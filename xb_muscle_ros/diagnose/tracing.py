@@ -15,10 +15,11 @@ from xb_muscle_ros.diagnose.noise.cells import Residual
 from xb_muscle_ros.diagnose.noise.residuals import Around
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.search.system import Names
-from xb_muscle_ros.diagnose.search.whole import FRAMES, absent
+from xb_muscle_ros.diagnose.search.whole import FRAMES
 from xb_muscle_ros.diagnose.searching import Searched
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.problem import Problem
+from xb_muscle_ros.models.catalogue import CATALOGUE
 
 Array = npt.NDArray[np.float64]
 
@@ -98,7 +99,7 @@ def _without(study: Searched, chosen: Names, name: Name, i: int) -> list[Array] 
                 if c.name == name.value:
                     z[j] = 0.0
             return problem.predicted(z)
-        gone = absent(name)
+        gone = CATALOGUE[name].absent
         kept = [j for j, c in enumerate(problem.coordinates) if c.name not in gone]
         fibre = problem.fibre_at(z)
         fibre = replace(fibre, values={**fibre.values, **gone})

@@ -5,40 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
-# Names that are not their identifier with spaces.
+from xb_muscle_ros.models.catalogue import CATALOGUE
+
+# Names that are not their identifier with spaces; mechanisms bring theirs.
 _NAMES: Mapping[str, str] = {
-    "filament_friction": "friction of bound heads",
-    "static_calcium_stiffness": "static calcium-dependent stiffness",
-    "length_dependent_activation": "length-dependent activation",
-    "strain_recruited_heads": "heads recruited by strain",
-    "nonlinear_crossbridge": "non-linear cross-bridges",
-    "half_sarcomere_spread": "uneven half-sarcomeres",
-    "thin_filament_cooperativity": "thin-filament cooperativity",
-    "thick_filament_cooperativity": "thick-filament cooperativity",
     "pca_shift": "pCa shift",
     "run_down": "run-down",
     "base": "the base model",
 }
 _MEANINGS: Mapping[str, str] = {
-    "viscous_drag": "a force proportional to the speed of stretch",
-    "passive_viscoelasticity": "springs with dashpots beside the cross-bridges; force decays after a stretch",
-    "weakly_bound_heads": "heads that bind and let go quickly and hold for a moment when the fibre is stretched",
-    "filament_friction": "links of bound heads are elastic for a short way, slip, and take time to form anew",
-    "active_titin": "a spring that engages when the fibre is activated and is stretched from there on",
-    "static_calcium_stiffness": "a spring whose stiffness follows calcium, not force",
-    "length_dependent_activation": "a longer fibre is more sensitive to calcium",
-    "lattice_spacing": "heads attach faster when the fibre is longer and its lattice tighter",
-    "filament_overlap": "the number of heads within reach changes with length",
-    "strain_recruited_heads": "stretch wakes heads that were resting on the thick filament",
-    "persistent_thick_filament": "heads that force has woken go to rest more slowly than the model has it",
-    "forcible_detachment": "heads stretched too far are torn off and bind again quickly",
-    "nonlinear_crossbridge": "the stiffness of a head changes with how far it is stretched",
-    "half_sarcomere_spread": "stronger half-sarcomeres shorten at the cost of weaker ones in series",
-    "series_compliance": "a spring in series takes up part of the length change",
-    "thin_filament_cooperativity": "bound heads and active sites help their neighbours to become active",
-    "thick_filament_cooperativity": "force wakes heads that were resting on the thick filament",
-    "temperature": "the recordings were made warmer or colder than the model assumes",
-    "phosphate": "phosphate in the solution lets heads detach before they have done their work",
     "pca_shift": "a solution had more or less free calcium than its label says",
     "run_down": "the fibre lost force from trial to trial",
     "force_offset": "the transducer did not read zero at zero force",
@@ -74,12 +49,12 @@ SCALES: Mapping[str, str] = MappingProxyType(
 
 def human(name: str) -> str:
     """A mechanism or artefact as a sentence calls it."""
-    return _NAMES.get(name, name.replace("_", " "))
+    return CATALOGUE[name].title if name in CATALOGUE else _NAMES.get(name, name.replace("_", " "))
 
 
 def meaning(name: str) -> str:
     """What it is, in one line; empty where nothing is known."""
-    return _MEANINGS.get(name, "")
+    return CATALOGUE[name].meaning if name in CATALOGUE else _MEANINGS.get(name, "")
 
 
 def family_words(family: str) -> str:

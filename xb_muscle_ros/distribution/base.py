@@ -6,20 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar, NamedTuple
 
-from xb_muscle_ros.mechanisms.base import GaussianSpread, Parameter, Quantities, State, StrainRate
-from xb_muscle_ros.mechanisms.ops import Expr
-
-
-class Moments(NamedTuple):
-    """Zeroth to second moment over strain: of heads, or of a flux of heads (1/s)."""
-
-    m0: Expr
-    m1: Expr
-    m2: Expr
-
-    def plus(self, other: Moments, sign: int = 1) -> Moments:
-        """Sum, or difference with sign -1."""
-        return Moments(self.m0 + sign * other.m0, self.m1 + sign * other.m1, self.m2 + sign * other.m2)
+from xb_muscle_ros.mechanisms import Expr, GaussianSpread, Moments, Parameter, Quantities, State, StrainRate
 
 
 class Ways(NamedTuple):

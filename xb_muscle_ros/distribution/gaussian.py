@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 
-from xb_muscle_ros.distribution.base import MomentRepresentation, Moments
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import ExponentialRate, Quantities, State, StepRate, StrainRate
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.distribution.base import MomentRepresentation
+from xb_muscle_ros.mechanisms import ExponentialRate, Expr, Moments, Quantities, State, StepRate, StrainRate, ops
 
 # Moments in power strokes: at 40 the fibre's end would have moved by 30 % L0 with the heads still attached.
 _FAR = 40.0

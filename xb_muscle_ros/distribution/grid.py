@@ -11,8 +11,8 @@ import functools
 from collections.abc import Mapping
 from typing import ClassVar
 
-from xb_muscle_ros.distribution.base import Fluxes, Moments, Representation, Settling, Ways
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities, State
+from xb_muscle_ros.distribution.base import Fluxes, Representation, Settling, Ways
+from xb_muscle_ros.mechanisms import Moments, Parameter, Quantities, State
 
 BINS = Parameter("bins", "1", "points of the strain grid", 8.0, 100000.0, 200.0, "van der Zee et al. 2026")
 RANGE = Parameter(

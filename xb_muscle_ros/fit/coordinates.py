@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS, Scope
-from xb_muscle_ros.models.catalogue import Entry, mechanisms_of
+from xb_muscle_ros.mechanisms import Entry
+from xb_muscle_ros.models.catalogue import mechanisms_of
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.parameters import PARAMETERS
 

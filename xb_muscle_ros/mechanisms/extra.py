@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import enum
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import ClassVar, NamedTuple
 
-from xb_muscle_ros.mechanisms.base import Family, Mechanism, Quantities, StrainRate
+from xb_muscle_ros.mechanisms.base import Family, Mechanism, StrainRate, Values
 from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms.quantities import Quantities
 
 
 class Needs(enum.Enum):
@@ -19,12 +20,16 @@ class Needs(enum.Enum):
     SUPER_RELAXED = "super-relaxed heads"
 
 
-class HeadMoments(NamedTuple):
-    """Zeroth to second moment over strain of heads, or of heads per second."""
+class Moments(NamedTuple):
+    """Zeroth to second moment over strain: of heads, or of a flux of heads (1/s)."""
 
     m0: Expr
     m1: Expr
     m2: Expr
+
+    def plus(self, other: Moments, sign: int = 1) -> Moments:
+        """Sum, or difference with sign -1."""
+        return Moments(self.m0 + sign * other.m0, self.m1 + sign * other.m1, self.m2 + sign * other.m2)
 
 
 class Extra(Mechanism):
@@ -49,7 +54,7 @@ class Extra(Mechanism):
         """Rate of that force at constant length, 1/s, and its stiffness per power stroke."""
         return 0, 0
 
-    def modified(self, q: Quantities) -> Mapping[str, Expr]:
+    def modified(self, q: Quantities) -> Values:
         """Other values for parameters and inputs, by name; the model's blocks see these in place of their own."""
         return {}
 
@@ -61,13 +66,9 @@ class Extra(Mechanism):
         """Further rates at which attached heads detach to the ready state."""
         return ()
 
-    def head_force(self, q: Quantities, m: HeadMoments) -> Expr:
+    def head_force(self, q: Quantities, m: Moments) -> Expr:
         """What heads bear beyond Q0 + Q1, from their moments; linear in these, so that rates may stand for heads."""
         return 0
-
-    def derivatives(self, q: Quantities) -> Mapping[str, Expr]:
-        """Rates of change of the block's own states, 1/s; ``q.ce_velocity`` (power strokes/s) is among the names."""
-        return {}
 
 
 class Unit(NamedTuple):
@@ -98,7 +99,7 @@ class Chain(NamedTuple):
     stiffness: Expr
     own_velocity: Callable[[Expr], Expr]
     other_velocity: Callable[[Expr], Expr]
-    derivatives: Callable[[Expr], Mapping[str, Expr]]
+    derivatives: Callable[[Expr], Values]
 
 
 class InSeries(Extra):

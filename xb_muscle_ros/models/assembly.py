@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from xb_muscle_ros.distribution.base import Moments, Representation, Ways
+from xb_muscle_ros.distribution.base import Representation, Ways
 from xb_muscle_ros.distribution.gaussian import Gaussian
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Quantities
-from xb_muscle_ros.mechanisms.extra import Chain, Extra, HeadMoments, Unit
-from xb_muscle_ros.mechanisms.ops import Expr
-from xb_muscle_ros.models.composition import INPUTS, Composition, Equations, other_states
+from xb_muscle_ros.mechanisms import Chain, Expr, Extra, Moments, Quantities, Unit, ops
+from xb_muscle_ros.models.composition import OUTPUTS, Composition, Equations, other_states
 
 
 def equations(model: Composition, smooth: bool) -> Equations:
@@ -24,8 +21,7 @@ def equations(model: Composition, smooth: bool) -> Equations:
 
     from xb_muscle_ros.models.factoring import replaced
 
-    names = [*(s.name for s in model.states), *(i.name for i in INPUTS), *(p.name for p in model.parameters)]
-    symbols = {name: sympy.Symbol(name, real=True) for name in names}
+    symbols = model.symbols()
     shift = sympy.Symbol("shift", real=True)
     fixed = Moments(symbols["q0"], symbols["q1"], symbols["q2"])
     moved = _moved(fixed, shift)
@@ -41,13 +37,21 @@ def equations(model: Composition, smooth: bool) -> Equations:
         parameters=model.parameters,
         symbols=symbols,
         shift=shift,
-        derivatives=tuple(sympy.sympify(e) for e in derivatives),
-        arrival=tuple(sympy.sympify(e) for e in (*moved, *(symbols[s.name] for s in model.states[3:]))),
-        rest=tuple(sympy.sympify(e) for e in (0, 0, 0, *rest_of_states(model, symbols))),
-        outputs=tuple(replaced(sympy.sympify(e), at_start) for e in output_expressions(model, parts.q)),
+        derivatives=derivatives,
+        arrival=[*moved, *(symbols[s.name] for s in model.states[3:])],
+        rest=[0, 0, 0, *rest_of_states(model, symbols)],
+        outputs=[replaced(sympy.sympify(e), at_start) for e in parts.outputs],
         # The smooth form never divides by less than ln 2 / K heads.
         shares=() if smooth else ("q0", "q1", "q2"),
     )
+
+
+def evaluated(model: Composition, values: Mapping[str, float]) -> dict[str, float]:
+    """See `Model.evaluated`."""
+    parts = rates(model, Quantities(values, "composition", None))
+    of_states = {**dict(zip(("q0", "q1", "q2"), parts.kinetics, strict=True)), **parts.others}
+    found = {f"rate of {name}": rate for name, rate in of_states.items()} | {"velocity": parts.own_velocity}
+    return found | dict(zip(OUTPUTS, parts.outputs, strict=True))
 
 
 def rest_of_states(model: Composition, symbols: Mapping[str, Any]) -> list[Expr]:
@@ -73,14 +77,14 @@ class Parts(NamedTuple):
         others: rates of change of the blocks' own states, by name.
         ways: how heads come and go, in terms of strain.
         own_velocity: at which the model's own heads are carried along, power strokes/s.
-        q: all quantities, ``ce_velocity`` among them.
+        outputs: values of `OUTPUTS`.
     """
 
     kinetics: Moments
     others: Mapping[str, Expr]
     ways: Ways
     own_velocity: Expr
-    q: Quantities
+    outputs: list[Expr]
 
 
 def rates(model: Composition, q: Quantities) -> Parts:
@@ -117,7 +121,7 @@ def rates(model: Composition, q: Quantities) -> Parts:
     others.update(model.series.derivatives(q.for_block(model.series.name)))
     for extra in model.extras:
         others.update(extra.derivatives(q.for_block(extra.name)))
-    return Parts(own.kinetics, others, own.ways, own_velocity, q)
+    return Parts(own.kinetics, others, own.ways, own_velocity, _outputs(model, q))
 
 
 def _with_inner(unit: Unit, extra: Extra, q: Quantities) -> Unit:
@@ -152,13 +156,13 @@ def _sarcomere_change(model: Composition, q: Quantities) -> Expr:
     return q.length_change - extension / q.gamma
 
 
-def _borne(model: Composition, q: Quantities, m: HeadMoments) -> Expr:
+def _borne(model: Composition, q: Quantities, m: Moments) -> Expr:
     """What heads bear, power-stroke units; rates may stand for heads."""
     return m.m0 + m.m1 + sum(extra.head_force(q.for_block(extra.name), m) for extra in model.extras)
 
 
-def _moments(q: Quantities) -> HeadMoments:
-    return HeadMoments(q.q0, q.q1, q.q2)
+def _moments(q: Quantities) -> Moments:
+    return Moments(q.q0, q.q1, q.q2)
 
 
 def _heads(model: Composition, representation: Representation, q: Quantities) -> _Heads:
@@ -188,11 +192,11 @@ def _heads(model: Composition, representation: Representation, q: Quantities) ->
     net = kinetics.m0 + torn - back
     others.update(thick.derivatives(q.for_block(thick.name, attachment_rate_net=net)))
     # Strain grows by one power stroke with every power stroke of movement: Q1 by Q0, Q2 by 2 Q1.
-    stiffness = _borne(model, q, HeadMoments(0, q.q0, 2 * q.q1))
+    stiffness = _borne(model, q, Moments(0, q.q0, 2 * q.q1))
     if stiffness != q.q0:
         # Heads whose force bends lose their stiffness where they are compressed far: it does not go below zero.
         stiffness = ops.positive(stiffness)
-    unit = Unit(q.force_xb, _borne(model, q, HeadMoments(*kinetics)), stiffness)
+    unit = Unit(q.force_xb, _borne(model, q, kinetics), stiffness)
     return _Heads(q, kinetics, ways, others, unit)
 
 
@@ -207,7 +211,7 @@ def _carried(model: Composition, heads: _Heads, velocity: Expr, values: Mapping[
     return {row.name: rates_of[name] for row, name in other_states(model)}
 
 
-def output_expressions(model: Composition, q: Quantities) -> list[Expr]:
+def _outputs(model: Composition, q: Quantities) -> list[Expr]:
     """Expressions of `OUTPUTS`."""
     extension = model.series.extension(q.for_block(model.series.name))
     force_pe = model.parallel.force(q.for_block(model.parallel.name))

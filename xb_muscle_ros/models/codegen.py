@@ -8,11 +8,11 @@ from typing import Any
 
 import sympy
 
-from xb_muscle_ros.mechanisms.base import Parameter
+from xb_muscle_ros.mechanisms import Parameter
 from xb_muscle_ros.models.composition import INPUTS, OUTPUTS, Equations, Model
 from xb_muscle_ros.models.elimination import Elimination
 from xb_muscle_ros.models.factoring import replaced
-from xb_muscle_ros.models.program import Program, c, jacobian, program, python
+from xb_muscle_ros.models.program import Program, jacobian, program, python
 from xb_muscle_ros.stepping import rosenbrock3
 from xb_muscle_ros.symbolic.symbols import CALLS
 
@@ -34,16 +34,6 @@ _SHARE_OF_HEADS = 0.01
 _JIT = '@njit(cache=True, error_model="numpy", forceinline=True)'
 
 
-def module_text(model: Model, smooth: bool) -> str:
-    """Text of the module that steps a model.
-
-    Args:
-        model: the composition.
-        smooth: with the released sets' smooth functions, or exact.
-    """
-    return model.module_text(smooth)
-
-
 def header(model: Model, smooth: bool, order: int, interpolated: bool) -> str:
     """Head of a generated module: imports, and the constants that the loops of `stepping.kernels` use."""
     kind = " with smooth functions" if smooth else ""
@@ -63,7 +53,7 @@ def header(model: Model, smooth: bool, order: int, interpolated: bool) -> str:
 def flat_module(model: Model, smooth: bool) -> str:
     """A model whose every state is a symbol: one flat right-hand side, one flat Rosenbrock step."""
     e = model.equations(smooth)
-    shared = program(_rates(e), "t")
+    shared = program(all_rates(e), "t")
     prepare = function("prepare(p)", "Parameters and what is computed from them once.", ["return p.copy()"])
     stay = function("regrid(s, p, work)", "Moments need no grid.", ["pass"])
     parts = [
@@ -72,40 +62,17 @@ def flat_module(model: Model, smooth: bool) -> str:
         stay,
         _rhs(e, shared),
         _attempt(e, shared),
-        _slope(e),
     ]
-    parts += [vector("rest", e.parameters, e.rest), _outputs(e), _violation(e, smooth)]
+    parts += [_slope(e), vector("rest", e.parameters, e.rest), _outputs(e), _violation(e, smooth)]
     return "\n\n".join(parts) + "\n\n\n" + kernels() + "\n"
 
 
-def c_text(model: Model, smooth: bool) -> str:
-    """The same right-hand side in C, for comparison: `void rhs(const double *z, double velocity, ...)`."""
-    from xb_muscle_ros.symbolic.intrinsics import C_SOURCE
-
-    e = model.equations(smooth)
-    lines = _scalars(e, "z", c_style=True)
-    body = program(_rates(e), "t")
-    lines += [f"double {s} = {c(x)};" for s, x in body.lines]
-    lines += [f"out[{i}] = {c(r)};" for i, r in enumerate(body.results)]
-    text = "\n    ".join(lines)
-    head = "void rhs(const double *restrict z, double velocity, double calcium, const double *restrict p,"
-    return f"#include <math.h>\n{C_SOURCE}\n{head} double *restrict out) {{\n    {text}\n}}\n"
-
-
-def _scalars(e: Equations, source: str, c_style: bool = False) -> list[str]:
-    """Lines that load parameters and states from arrays, behind the states the shift and, if need be, the length."""
-    kind, end = ("double ", ";") if c_style else ("", "")
-    lines = [f"{kind}{p.name} = p[{i}]{end}" for i, p in enumerate(e.parameters)]
-    lines += [f"{kind}{s.name} = {source}[{i}]{end}" for i, s in enumerate(e.states)]
-    return [*lines, *(f"{kind}{name} = {source}[{len(e.states) + i}]{end}" for i, name in enumerate(_moving(e)))]
-
-
-def _moving(e: Equations) -> list[str]:
+def moving(e: Equations) -> list[str]:
     """What moves within a step beside the states: the shift, and the length change where rates depend on it."""
     return ["shift", "length_change"] if e.follows_length else ["shift"]
 
 
-def _rates(e: Equations) -> tuple[Any, ...]:
+def all_rates(e: Equations) -> Sequence[Any]:
     """Rates of the states and of what moves beside them."""
     return e.derivatives if e.follows_length else e.derivatives[:-1]
 
@@ -127,45 +94,46 @@ def _plain(head: str, doc: str, lines: Iterable[str]) -> str:
     return f'def {head}:\n    """{doc}"""\n{body}\n'
 
 
-def assignments(body: Program) -> list[str]:
-    """Lines of a program."""
-    return [f"{symbol} = {python(expression)}" for symbol, expression in body.lines]
+def computed(parameters: Sequence[Parameter], *bodies: Program) -> list[str]:
+    """Lines that load the parameters that some programs use, and lines of the first of them."""
+    names = {str(s) for s in used_symbols(*bodies)}
+    loads = [f"{p.name} = p[{i}]" for i, p in enumerate(parameters) if p.name in names]
+    return [*loads, *(f"{symbol} = {python(expression)}" for symbol, expression in bodies[0].lines)]
 
 
-def parameter_loads(parameters: Sequence[Parameter], used: Iterable[Any]) -> list[str]:
-    """Lines that load the parameters among some symbols."""
-    names = {str(s) for s in used}
-    return [f"{p.name} = p[{i}]" for i, p in enumerate(parameters) if p.name in names]
+def filled(results: Iterable[Any]) -> list[str]:
+    """Lines that put results into the vector ``out``."""
+    return [f"out[{i}] = {python(r)}" for i, r in enumerate(results)]
+
+
+def _states(e: Equations) -> list[str]:
+    """Lines that load the states, and the length change where rates depend on it."""
+    lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
+    return [*lines, f"length_change = s[{len(e.states)}]"] if e.follows_length else lines
 
 
 def used_symbols(*programs: Program) -> set[Any]:
     """All symbols of some programs."""
-    found: set[Any] = set()
-    for body in programs:
-        for _, expression in body.lines:
-            found |= expression.free_symbols
-        for result in body.results:
-            found |= result.free_symbols
-    return found
+    parts = [part for body in programs for part in (*(line for _, line in body.lines), *body.results)]
+    return set().union(*(part.free_symbols for part in parts))
 
 
 def _rhs(e: Equations, body: Program) -> str:
     """Rates of change in the fixed frame, scalars in and a tuple out: nothing touches memory."""
-    names = ", ".join([*(s.name for s in e.states), *_moving(e)])
-    lines = [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
-    lines.append(f"return ({', '.join(python(r) for r in body.results)},)")
+    names = ", ".join([*(s.name for s in e.states), *moving(e)])
+    lines = [*computed(e.parameters, body), f"return ({', '.join(python(r) for r in body.results)},)"]
     # Called by straight lines only, which take it in.
     text = _plain(f"rates({names}, velocity, calcium, p)", "Rates of the states and of the shift.", lines)
-    size = len(_rates(e))
+    size = len(all_rates(e))
     call = [f"r = rates({', '.join(f'z[{i}]' for i in range(size))}, velocity, calcium, p)"]
     call += [f"out[{i}] = r[{i}]" for i in range(size)]
-    doc = f"The same on arrays; z ends in {' and '.join(_moving(e))}."
+    doc = f"The same on arrays; z ends in {' and '.join(moving(e))}."
     return text + "\n\n" + straight("rhs(z, velocity, calcium, p, out)", doc, call)
 
 
 def _attempt(e: Equations, body: Program) -> str:
     """One Rosenbrock step, written out."""
-    names = [*(s.name for s in e.states), *_moving(e)]
+    names = [*(s.name for s in e.states), *moving(e)]
     variables = [*(e.symbols[s.name] for s in e.states), e.shift, e.symbols["length_change"]][: len(names)]
     starts = ["0.0" if name == "shift" else name for name in names]
     n = len(names)
@@ -175,9 +143,7 @@ def _attempt(e: Equations, body: Program) -> str:
     flat = flat.substituted({e.shift: sympy.Integer(0)}).needed()
     first, entries = flat.results[:n], flat.results[n:]
     solver = Elimination([[entries[i * n + j] != 0 for j in range(n)] for i in range(n)])
-    lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
-    lines += [f"length_change = s[{len(e.states)}]"] if e.follows_length else []
-    lines += [*parameter_loads(e.parameters, used_symbols(flat)), *assignments(flat)]
+    lines = [*_states(e), *computed(e.parameters, flat)]
     lines += ["per_h = 1.0 / h", f"diagonal = per_h * {1.0 / rosenbrock3.GAMMA!r}"]
     for i, j in solver.entries():
         entry = entries[i * n + j]
@@ -201,8 +167,7 @@ def _attempt(e: Equations, body: Program) -> str:
     lines += [f"y_{i} = {_sum([starts[i]], rosenbrock3.M, i)}" for i in range(n)]
     swap = {symbol: sympy.Symbol(f"y_{i}", real=True) for i, symbol in enumerate(variables)}
     arrival = program([replaced(x, swap) for x in e.arrival], "m")
-    lines += assignments(arrival)
-    lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(arrival.results)]
+    lines += [*computed((), arrival), *filled(arrival.results)]
     # Relative for large moments, absolute otherwise: forces and fractions are of order one.
     lines += ["error = 0.0"]
     for i in range(n):
@@ -242,28 +207,21 @@ def moving_rates(e: Equations) -> list[Any]:
 def _slope(e: Equations) -> str:
     """Rates of change, for interpolation and to tell whether a fibre is at rest."""
     body = program(moving_rates(e), "t")
-    lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
-    lines += [f"length_change = s[{len(e.states)}]"] if e.follows_length else []
-    lines += [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
-    lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
+    lines = [*_states(e), *computed(e.parameters, body), *filled(body.results)]
     return straight("slope(s, velocity, calcium, p, out)", "Rates of change of the integrated states.", lines)
 
 
 def _outputs(e: Equations) -> str:
     body = program(e.outputs, "t")
-    n = len(e.states)
-    lines = [f"{s.name} = s[{i}]" for i, s in enumerate(e.states)]
-    lines += [f"{s.name} = s[{n + i}]" for i, s in enumerate(INPUTS)]
-    lines += [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
-    lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
+    lines = [f"{s.name} = s[{i}]" for i, s in enumerate((*e.states, *INPUTS))]
+    lines += [*computed(e.parameters, body), *filled(body.results)]
     return straight("outputs(s, p, out)", "Forces, contractile element and states, as named in OUTPUTS.", lines)
 
 
 def vector(name: str, parameters: Sequence[Parameter], expressions: Iterable[Any]) -> str:
     """Text of a function of the parameters that fills a vector."""
     body = program(list(expressions), "t")
-    lines = [*parameter_loads(parameters, used_symbols(body)), *assignments(body)]
-    lines += [f"out[{i}] = {python(r)}" for i, r in enumerate(body.results)]
+    lines = [*computed(parameters, body), *filled(body.results)]
     return straight(f"{name}(p, out)", "State of a fibre at rest without calcium.", lines)
 
 

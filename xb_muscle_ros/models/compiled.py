@@ -7,33 +7,18 @@ file's name carries a hash of everything that it depends on, so that a changed m
 from __future__ import annotations
 
 import functools
-import hashlib
 import importlib.util
 import os
 import sys
 import tempfile
-from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
-import numba
-
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.mechanisms.discovery import is_outside, place
+from xb_muscle_ros.models.composition import Model
+from xb_muscle_ros.models.fingerprint import fingerprint
 from xb_muscle_ros.models.registry import compose
-
-_PACKAGE = Path(__file__).resolve().parents[1]
-_SOURCES = ("symbolic", "mechanisms", "distribution", "models", "stepping")
-
-
-@functools.lru_cache(maxsize=1)
-def _fingerprint() -> str:
-    """Hash of all source that generated code depends on, and of what compiles it."""
-    digest = hashlib.sha256(f"{sys.version} numba {numba.__version__} sympy {version('sympy')}".encode())
-    for folder in _SOURCES:
-        for file in sorted((_PACKAGE / folder).rglob("*.py")):
-            digest.update(str(file.relative_to(_PACKAGE)).encode())
-            digest.update(file.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def cache_folder() -> Path:
@@ -60,9 +45,9 @@ def cache_folder() -> Path:
     )
 
 
-def _path(name: str, smooth: bool) -> Path:
-    """File of a composition's generated module."""
-    return cache_folder() / f"m_{name}_{'smooth' if smooth else 'exact'}_{_fingerprint()}.py"
+def _path(model: Model, smooth: bool) -> Path:
+    """File of a model's generated module."""
+    return cache_folder() / f"m_{model.name}_{'smooth' if smooth else 'exact'}_{fingerprint(model)}.py"
 
 
 def is_compiled(model: str, method: str, smooth: bool) -> bool:
@@ -71,7 +56,7 @@ def is_compiled(model: str, method: str, smooth: bool) -> bool:
     Raises:
         UserError: unknown names, or no folder to write to.
     """
-    return _path(compose(model, method).name, smooth).exists()
+    return _path(compose(model, method), smooth).exists()
 
 
 @functools.cache
@@ -87,14 +72,13 @@ def compiled(model: str, method: str, smooth: bool) -> ModuleType:
         UserError: unknown names, or no folder to write to.
     """
     composition = compose(model, method)
-    path = _path(composition.name, smooth)
+    path = _path(composition, smooth)
     stem = path.stem
     if not path.exists():
-        from xb_muscle_ros.models.codegen import module_text
-
+        text = _text(composition, smooth)
         # Under a name of its own first: another process may be at the same file.
         with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".tmp", delete=False, encoding="utf-8") as file:
-            file.write(module_text(composition, smooth))
+            file.write(text)
         Path(file.name).replace(path)
     spec = importlib.util.spec_from_file_location(f"xb_muscle_ros_generated_{stem}", path)
     if spec is None or spec.loader is None:
@@ -104,3 +88,21 @@ def compiled(model: str, method: str, smooth: bool) -> ModuleType:
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
+
+
+def _text(model: Model, smooth: bool) -> str:
+    """Text of a model's module.
+
+    Raises:
+        UserError: formulas from outside the package of which no code can be made.
+    """
+    try:
+        return model.module_text(smooth)
+    except Exception as error:
+        outside = [place(type(block)) for block in model.blocks if is_outside(type(block))]
+        if isinstance(error, UserError) or not outside:
+            raise
+        raise UserError(
+            f"no code can be made of {' and '.join(outside)} ({type(error).__name__}: {error}); formulas may use "
+            "+ - * / **, the functions of xb_muscle_ros.mechanisms.ops and those of q, but no if and no math"
+        ) from error

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from xb_muscle_ros.distribution.base import Representation, Settling
 from xb_muscle_ros.distribution.gaussian import Gaussian
-from xb_muscle_ros.mechanisms.base import (
+from xb_muscle_ros.mechanisms import (
     Attachment,
     Detachment,
+    Expr,
+    Extra,
     Family,
+    InSeries,
     Mechanism,
     Parallel,
     Parameter,
@@ -21,8 +24,6 @@ from xb_muscle_ros.mechanisms.base import (
     ThickFilament,
     ThinFilament,
 )
-from xb_muscle_ros.mechanisms.extra import Extra, InSeries
-from xb_muscle_ros.mechanisms.ops import Expr
 
 GAMMA = Parameter(
     "gamma", "power strokes/L0", "half-sarcomere length in power strokes (1.3 µm / 10 nm)", 1.0, 1e4, 130.0,
@@ -44,10 +45,25 @@ INPUTS = (
     State("velocity", "L0/s", "fibre velocity of the last step", -1e9, 1e9),
     State("calcium", "µM", "free calcium of the last step", 0.0, 1e6),
 )
-OUTPUTS = (
-    "force_f0", "force_ce_f0", "force_pe_f0", "ce_length_change_l0", "ce_velocity_l0_per_s",
-    "q0", "q1", "q2", "n_on", "drx", "r",
-)  # fmt: skip
+
+
+class Outputs(NamedTuple):
+    """What a fibre shows at one moment; forces in F0, lengths in L0, fractions of all heads or sites."""
+
+    force_f0: float
+    force_ce_f0: float
+    force_pe_f0: float
+    ce_length_change_l0: float
+    ce_velocity_l0_per_s: float
+    q0: float
+    q1: float
+    q2: float
+    n_on: float
+    drx: float
+    r: float
+
+
+OUTPUTS = Outputs._fields
 
 
 class Model(ABC):
@@ -61,8 +77,13 @@ class Model(ABC):
 
     @property
     @abstractmethod
+    def blocks(self) -> tuple[Mechanism, ...]:
+        """All blocks, in the order in which their states stand."""
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Rows of the parameter table that this model needs, without repeats."""
+        return distinct((*(p for block in self.blocks for p in block.parameters), *COMMON))
 
     @property
     @abstractmethod
@@ -77,6 +98,21 @@ class Model(ABC):
     def settling(self) -> Settling:
         """How a fibre is brought to rest."""
         return Representation.settling
+
+    def symbols(self, *further: str) -> dict[str, Any]:
+        """SymPy symbols of states, inputs and parameters, and of further names."""
+        import sympy
+
+        names = [*(s.name for s in (*self.states, *INPUTS)), *(p.name for p in self.parameters), *further]
+        return {name: sympy.Symbol(name, real=True) for name in names}
+
+    @abstractmethod
+    def evaluated(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Rates of the states and outputs, without smoothing, as the blocks' formulas give them with plain numbers.
+
+        Args:
+            values: of states, inputs and parameters, by name.
+        """
 
     @abstractmethod
     def equations(self, smooth: bool) -> Equations:
@@ -128,9 +164,8 @@ class Composition(Model):
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Rows of the parameter table that this model needs, without repeats."""
-        blocks = (p for block in self.blocks for p in block.parameters)
-        return distinct((*blocks, *COMMON, *self.representation.parameters))
+        """Those of the representation come last."""
+        return distinct((*super().parameters, *self.representation.parameters))
 
     @property
     def states(self) -> tuple[State, ...]:
@@ -139,7 +174,6 @@ class Composition(Model):
         return (*own, *(row for row, _ in other_states(self)))
 
     def state_rows(self, values: Mapping[str, float]) -> tuple[State, ...]:
-        """See the base class."""
         return self.representation.state_rows(self.states, values)
 
     @property
@@ -153,8 +187,12 @@ class Composition(Model):
         """The mechanism that puts another half-sarcomere in series, if there is one."""
         return next((extra for extra in self.extras if isinstance(extra, InSeries)), None)
 
+    def evaluated(self, values: Mapping[str, float]) -> dict[str, float]:
+        from xb_muscle_ros.models.assembly import evaluated
+
+        return evaluated(self, values)
+
     def equations(self, smooth: bool) -> Equations:
-        """See the base class."""
         from xb_muscle_ros.models.assembly import equations
 
         return equations(self, smooth)
@@ -189,32 +227,50 @@ def other_states(model: Composition) -> list[tuple[State, str]]:
     return found
 
 
-@dataclass(frozen=True)
-class Equations:
+@dataclass(frozen=True, kw_only=True)
+class Written:
     """A model written out in symbols.
 
     Attributes:
-        states: integrated states, in the strain frame of the contractile element's present position.
+        states: those that are symbols.
         parameters: in the order of the parameter vector.
         symbols: the SymPy symbol of every state, input and parameter, by name.
-        shift: the symbol of the contractile element's movement within a step, power strokes.
-        derivatives: rates of the states in the frame that was fixed at the start of the step, then that of the
-            shift, then that of the length change. In the fixed frame the movement of the heads with the contractile
-            element is exact: only attachment and detachment change the moments.
-        arrival: the states in the frame of the end of the step, from those in the fixed frame and the shift.
+        derivatives: rates of the states, then that of the shift: the contractile element's movement within a step.
         rest: states of a fibre at rest without calcium.
-        outputs: values of `OUTPUTS`, at zero shift.
-        shares: names of moments that are divided by the first of them, and so must be right relative to it.
+        outputs: values of `OUTPUTS`.
     """
 
     states: tuple[State, ...]
     parameters: tuple[Parameter, ...]
     symbols: Mapping[str, Any]
+    derivatives: Sequence[Expr]
+    rest: Sequence[Expr]
+    outputs: Sequence[Expr]
+
+    def __post_init__(self) -> None:
+        """Make plain numbers among the expressions SymPy's."""
+        import sympy
+
+        for name in ("derivatives", "rest", "outputs"):
+            object.__setattr__(self, name, tuple(sympy.sympify(e) for e in getattr(self, name)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Equations(Written):
+    """A model whose every state is a symbol, in the strain frame of the contractile element's present position.
+
+    Rates are those in the frame that was fixed at the start of the step; behind that of the shift stands that of the
+    length change. In the fixed frame the movement of the heads with the contractile element is exact: only attachment
+    and detachment change the moments. Outputs are those at zero shift.
+
+    Attributes:
+        shift: the symbol of the contractile element's movement within a step, power strokes.
+        arrival: the states in the frame of the end of the step, from those in the fixed frame and the shift.
+        shares: names of moments that are divided by the first of them, and so must be right relative to it.
+    """
+
     shift: Any
-    derivatives: tuple[Expr, ...]
-    arrival: tuple[Expr, ...]
-    rest: tuple[Expr, ...]
-    outputs: tuple[Expr, ...]
+    arrival: Sequence[Expr]
     shares: tuple[str, ...] = ()
 
     @property

@@ -164,7 +164,7 @@ def fibre_from_parameters(
         UserError: see `load_fibre`.
     """
     sets: dict[str, dict[str, float]] = {}
-    constants = {name: row.default for name, row in CONSTANTS.items()}
+    constants = {name: row.default or 1.0 for name, row in CONSTANTS.items()}
     text: dict[str, str] = {}
     sources: dict[str, str] = {}
     for name, value in parameters.items():
@@ -198,16 +198,13 @@ def fibre_from_parameters(
     starts = _swapped_starts(chosen, sets, given) if for_fit else {}
     given = {**given, **{name: values[0] for name, values in starts.items()}}
     values = complete(given, model_of_set(chosen), f"{where}, model {chosen}", how)
-    for name, number in constants.items():
-        if number is None:
-            raise UserError(f"{where}: constant '{name}' is missing")
     return Fibre(
         name=text["fibre"],
         model=chosen,
         method=how,
         values=MappingProxyType(values),
-        reference_length_m=float(constants["reference_length_m"] or 0.0),
-        f0_n=float(constants["f0_n"] or 0.0),
+        reference_length_m=constants["reference_length_m"],
+        f0_n=constants["f0_n"],
         source=sources.get(chosen) or sources.get(base_set(chosen)) or text.get("source", ""),
         path=None,
         available_models=tuple(sets),

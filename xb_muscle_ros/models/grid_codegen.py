@@ -12,8 +12,8 @@ from typing import Any
 
 import sympy
 
-from xb_muscle_ros.mechanisms.base import ExponentialRate, StepRate
-from xb_muscle_ros.models.codegen import assignments, function, header, kernels, parameter_loads, used_symbols, vector
+from xb_muscle_ros.mechanisms import ExponentialRate, StepRate
+from xb_muscle_ros.models.codegen import compiled_text, computed, function, header, kernels, used_symbols, vector
 from xb_muscle_ros.models.composition import INPUTS, Composition
 from xb_muscle_ros.models.grid_equations import SUMS, GridEquations, grid_equations
 from xb_muscle_ros.models.program import program, python
@@ -50,7 +50,7 @@ def _scalar_function(e: GridEquations, head: str, doc: str, results: Sequence[An
     body = program([sympy.sympify(r) for r in results], "t")
     used = {str(s) for s in used_symbols(body)}
     lines = [f"{s.name} = y[{i}]" for i, s in enumerate(e.states) if s.name in used]
-    lines += [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
+    lines += computed(e.parameters, body)
     values = [python(r) for r in body.results]
     lines.append(f"return ({', '.join(v if '.' in v or not v.lstrip('-').isdigit() else v + '.0' for v in values)},)")
     arguments = [*sums, "y", *(i.name for i in INPUTS), "p"]
@@ -59,12 +59,10 @@ def _scalar_function(e: GridEquations, head: str, doc: str, results: Sequence[An
 
 def _rate_constants(e: GridEquations) -> str:
     """Slope of the exponential in each rate's table; for a step, of the exponential inside its tanh."""
-    slopes = []
-    for rate, _ in e.leaving:
-        slopes.append(rate.slope if isinstance(rate, ExponentialRate) else -2 * rate.steepness)
+    slopes = [r.slope if isinstance(r, ExponentialRate) else -2 * r.steepness for r, _ in e.leaving]
     body = program([sympy.sympify(s) for s in slopes], "t")
-    lines = [*parameter_loads(e.parameters, used_symbols(body)), *assignments(body)]
-    lines.append(f"return ({', '.join(f'float({python(r)})' for r in body.results)},)")
+    results = ", ".join(f"float({python(r)})" for r in body.results)
+    lines = [*computed(e.parameters, body), f"return ({results},)"]
     return function("table_slopes(p)", "Slope of each rate's tabulated exponential, per power stroke.", lines)
 
 
@@ -159,7 +157,6 @@ def _bounds(e: GridEquations) -> str:
 
 def _kernels(remap: str) -> str:
     """The loops over bins, with one of the remappings under the name `regrid`."""
-    from xb_muscle_ros.models.codegen import compiled_text
     from xb_muscle_ros.stepping import grid_kernels, grid_remap
 
     text = compiled_text(Path(grid_kernels.__file__)) + "\n\n\n" + compiled_text(Path(grid_remap.__file__))

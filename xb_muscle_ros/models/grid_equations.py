@@ -2,42 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import sympy
 
 from xb_muscle_ros.distribution.base import Ways
-from xb_muscle_ros.mechanisms.base import ExponentialRate, Parameter, Quantities, State, StrainRate
-from xb_muscle_ros.mechanisms.ops import Expr
-from xb_muscle_ros.models.assembly import output_expressions, rates, rest_of_states
-from xb_muscle_ros.models.composition import INPUTS, Composition
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.mechanisms import ExponentialRate, Quantities, StrainRate
+from xb_muscle_ros.models.assembly import rates, rest_of_states
+from xb_muscle_ros.models.composition import Composition, Written
 
 SUMS = ("q0", "q1", "q2", "kin0", "kin1", "kin2", "torn_off", "reattached")
 
 
-@dataclass(frozen=True)
-class GridEquations:
-    """A model on a grid, written out in symbols.
+@dataclass(frozen=True, kw_only=True)
+class GridEquations(Written):
+    """A model on a grid: states are those beside the bins, symbols are also those of `SUMS`.
 
     Attributes:
-        states: those beside the bins.
-        parameters: in the order of the parameter vector.
-        symbols: of states, inputs, parameters and `SUMS`, by name.
         ways: how heads come and go.
-        derivatives: of the states, then of the shift, from states, inputs and sums.
-        rest: states of a fibre at rest.
-        outputs: as in `composition.OUTPUTS`.
     """
 
-    states: tuple[State, ...]
-    parameters: tuple[Parameter, ...]
-    symbols: Mapping[str, Any]
     ways: Ways
-    derivatives: tuple[Expr, ...]
-    rest: tuple[Expr, ...]
-    outputs: tuple[Expr, ...]
 
     @property
     def leaving(self) -> tuple[tuple[StrainRate, bool], ...]:
@@ -50,10 +36,9 @@ def grid_equations(model: Composition, smooth: bool) -> GridEquations:
 
     Raises:
         AttributeError: a block asks for a quantity that no block provides.
-        ValueError: a strain dependence whose shape changes with the state, which a grid's tables cannot follow.
+        UserError: a strain dependence whose shape changes with the state, which a grid's tables cannot follow.
     """
-    names = [*(s.name for s in model.states), *(i.name for i in INPUTS), *(p.name for p in model.parameters), *SUMS]
-    symbols = {name: sympy.Symbol(name, real=True) for name in names}
+    symbols = model.symbols(*SUMS)
     q = Quantities(symbols, "composition", symbols["smoothing"] if smooth else None)
     parts = rates(model, q)
     fixed = {symbols[p.name] for p in model.parameters}
@@ -61,14 +46,16 @@ def grid_equations(model: Composition, smooth: bool) -> GridEquations:
         shape = (rate.slope,) if isinstance(rate, ExponentialRate) else (rate.threshold, rate.steepness)
         for expression in shape:
             if sympy.sympify(expression).free_symbols - fixed:
-                raise ValueError(f"model {model.name}: strain dependence {expression} must depend on parameters alone")
-    derivatives = [*(parts.others[s.name] for s in model.states), parts.own_velocity]
+                raise UserError(
+                    f"model {model.name}: strain dependence {expression} must depend on parameters alone on a strain "
+                    "grid; take method gaussian"
+                )
     return GridEquations(
         states=model.states,
         parameters=model.parameters,
         symbols=symbols,
         ways=parts.ways,
-        derivatives=tuple(sympy.sympify(e) for e in derivatives),
-        rest=tuple(sympy.sympify(e) for e in rest_of_states(model, symbols)),
-        outputs=tuple(sympy.sympify(e) for e in output_expressions(model, parts.q)),
+        derivatives=[*(parts.others[s.name] for s in model.states), parts.own_velocity],
+        rest=rest_of_states(model, symbols),
+        outputs=parts.outputs,
     )

@@ -5,11 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from xb_muscle_ros.mechanisms.base import Contractile, Mechanism, Parallel, Parameter, Quantities, Series, State
-from xb_muscle_ros.mechanisms.extra import Extra
-from xb_muscle_ros.mechanisms.lumped import Activation, ForceVelocity
-from xb_muscle_ros.mechanisms.ops import Expr
-from xb_muscle_ros.models.composition import COMMON, INPUTS, OUTPUTS, Equations, Model, distinct
+from xb_muscle_ros.mechanisms import (
+    Activation,
+    Contractile,
+    Expr,
+    Extra,
+    ForceVelocity,
+    Mechanism,
+    Parallel,
+    Quantities,
+    Series,
+    State,
+)
+from xb_muscle_ros.models.composition import OUTPUTS, Equations, Model
 
 
 @dataclass(frozen=True)
@@ -34,26 +42,16 @@ class Hill(Model):
         return (self.activation, self.force_velocity, self.series, self.parallel, *self.extras)
 
     @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Rows of the parameter table that this model needs, without repeats."""
-        return distinct((*(p for block in self.blocks for p in block.parameters), *COMMON))
-
-    @property
     def states(self) -> tuple[State, ...]:
         """States that are integrated, without the inputs."""
         further = (s for extra in self.extras for s in extra.states)
         return (*self.activation.states, *self.series.length_states, *further)
 
-    def equations(self, smooth: bool) -> Equations:
-        """Write the model out; there is nothing to smooth."""
-        import sympy
-
-        names = [*(s.name for s in self.states), *(i.name for i in INPUTS), *(p.name for p in self.parameters)]
-        symbols = {name: sympy.Symbol(name, real=True) for name in names}
-        extension = sum(symbols[state.name] for state in self.series.length_states)
-        plain = q = Quantities(
-            {**symbols, "sarcomere_change": symbols["length_change"] - extension / symbols["gamma"]}, self.name, None
-        )
+    def _written(self, values: Mapping[str, Expr]) -> tuple[dict[str, Expr], Expr, dict[str, Expr]]:
+        """Rates of the states, velocity of the contractile element, and outputs by name, where they are not 0."""
+        extension = sum(values[state.name] for state in self.series.length_states)
+        sarcomere = values["length_change"] - extension / values["gamma"]
+        plain = q = Quantities({**values, "sarcomere_change": sarcomere}, self.name, None)
         for extra in self.extras:
             q = q.for_block(self.name, **extra.modified(q.for_block(extra.name)))
         level = self.activation.level(q.for_block(self.activation.name))
@@ -65,14 +63,14 @@ class Hill(Model):
             velocity_at=lambda force: self.force_velocity.velocity(of_relation, force / level),
         )
         balance = self.series.balance(q.for_block(self.series.name), element)
-        others = {**self.activation.derivatives(q.for_block(self.activation.name)), **balance.derivatives}
+        rates = {**self.activation.derivatives(q.for_block(self.activation.name)), **balance.derivatives}
         force_ce = q.Fscale * balance.force
         force_pe = self.parallel.force(q.for_block(self.parallel.name))
         for extra in self.extras:
             mine = plain.for_block(extra.name, available_sites=level, ce_velocity=balance.ce_velocity)
             force_pe = force_pe + extra.force(mine)
-            others.update(extra.derivatives(mine))
-        shown: Mapping[str, Expr] = {
+            rates.update(extra.derivatives(mine))
+        shown = {
             "force_f0": force_ce + force_pe,
             "force_ce_f0": force_ce,
             "force_pe_f0": force_pe,
@@ -80,20 +78,30 @@ class Hill(Model):
             "ce_velocity_l0_per_s": balance.ce_velocity / q.gamma,
             "n_on": level,
         }
+        return rates, balance.ce_velocity, shown
+
+    def evaluated(self, values: Mapping[str, float]) -> dict[str, float]:
+        rates, velocity, shown = self._written(values)
+        return {**{f"rate of {name}": rate for name, rate in rates.items()}, "velocity": velocity, **shown}
+
+    def equations(self, smooth: bool) -> Equations:
+        """Write the model out; there is nothing to smooth."""
+        import sympy
+
+        symbols = self.symbols()
+        rates, velocity, shown = self._written(symbols)
         rest: dict[str, Expr] = {}
         for block in self.blocks:
-            rest.update(block.rest(plain.for_block(block.name)))
+            rest.update(block.rest(Quantities(symbols, block.name, None)))
         return Equations(
             states=self.states,
             parameters=self.parameters,
             symbols=symbols,
             shift=sympy.Symbol("shift", real=True),
-            derivatives=tuple(
-                sympy.sympify(e) for e in (*(others[s.name] for s in self.states), balance.ce_velocity, q.velocity)
-            ),
-            arrival=tuple(symbols[s.name] for s in self.states),
-            rest=tuple(sympy.sympify(rest.get(s.name, 0)) for s in self.states),
-            outputs=tuple(sympy.sympify(shown.get(name, 0)) for name in OUTPUTS),
+            derivatives=[*(rates[s.name] for s in self.states), velocity, symbols["velocity"]],
+            arrival=[symbols[s.name] for s in self.states],
+            rest=[rest.get(s.name, 0) for s in self.states],
+            outputs=[shown.get(name, 0) for name in OUTPUTS],
         )
 
     def module_text(self, smooth: bool) -> str:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import enum
 import functools
 import math
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.compiled import compiled
+from xb_muscle_ros.models.composition import Outputs as Outputs
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.inputs import check, check_samples
 from xb_muscle_ros.models.registry import compose, model_of_set
@@ -40,22 +41,6 @@ class Result(enum.Enum):
 
 
 _RESULTS = tuple(Result)
-
-
-class Outputs(NamedTuple):
-    """What a fibre shows at one moment; forces in F0, lengths in L0, fractions of all heads or sites."""
-
-    force_f0: float
-    force_ce_f0: float
-    force_pe_f0: float
-    ce_length_change_l0: float
-    ce_velocity_l0_per_s: float
-    q0: float
-    q1: float
-    q2: float
-    n_on: float
-    drx: float
-    r: float
 
 
 class Muscle:
@@ -201,6 +186,7 @@ class Muscle:
         calcium_um: Array,
         substeps: int = 1,
         every: int = 1,
+        counts: list[int] | None = None,
     ) -> Array:
         """States at every sample, shape (n, state): the result of `step` from sample to sample, bit for bit.
 
@@ -211,23 +197,12 @@ class Muscle:
             calcium_um: shape (n,), µM; the k-th acts in the step that ends at the k-th sample.
             substeps: steps between two samples.
             every: stride of the samples whose states are returned, the first included.
+            counts: the number of steps that were tried is added to it.
 
         Raises:
             UserError: see `inputs.check_samples`.
             StateViolation: see `step`; the time counts from the first sample.
         """
-        return self.run_counted(state, dt_s, length_change_l0, calcium_um, substeps, every)[0]
-
-    def run_counted(
-        self,
-        state: Array,
-        dt_s: Array,
-        length_change_l0: Array,
-        calcium_um: Array,
-        substeps: int = 1,
-        every: int = 1,
-    ) -> tuple[Array, int]:
-        """As `run`, with the number of steps tried."""
         states = np.zeros(((length_change_l0.size - 1) // every + 1, self._n))
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (dt_s, length_change_l0, calcium_um)]
         check_samples(self.fibre.name, *arrays)
@@ -236,7 +211,9 @@ class Muscle:
         )
         if code != 0:
             self.complain(code, fault, float(arrays[0][: k - 1].sum() + within), states[-1])
-        return states, steps
+        if counts is not None:
+            counts.append(steps)
+        return states
 
     def follow(
         self,
@@ -246,6 +223,7 @@ class Muscle:
         calcium_um: Array,
         sample_s: Array,
         tolerance: float = 1e-6,
+        counts: list[int] | None = None,
     ) -> Array:
         """States at the samples by variable steps that land on every corner of the input.
 
@@ -255,23 +233,12 @@ class Muscle:
             calcium_um: shape (m,), µM; the k-th acts up to the k-th corner.
             sample_s: shape (n,), ascending, within the corners, s.
             tolerance: error of one step in units of the states (1e-6: about 1e-7 F0).
+            counts: see `run`.
 
         Raises:
             UserError: see `inputs.check_samples`.
             StateViolation: see `step`.
         """
-        return self.follow_counted(state, corner_s, length_change_l0, calcium_um, sample_s, tolerance)[0]
-
-    def follow_counted(
-        self,
-        state: Array,
-        corner_s: Array,
-        length_change_l0: Array,
-        calcium_um: Array,
-        sample_s: Array,
-        tolerance: float = 1e-6,
-    ) -> tuple[Array, int]:
-        """As `follow`, with the number of steps tried."""
         states = np.zeros((sample_s.size, self._n))
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (corner_s, length_change_l0, calcium_um, sample_s)]
         check_samples(self.fibre.name, np.diff(arrays[0]), arrays[1], arrays[2])
@@ -280,7 +247,9 @@ class Muscle:
         )
         if code != 0:
             self.complain(code, fault, t, self._work[1])
-        return states, steps
+        if counts is not None:
+            counts.append(steps)
+        return states
 
     def hold(self, state: Array, calcium_um: float, duration_s: float) -> Array:
         """State after `duration_s` at the state's own length with calcium (µM) held, by the method's best steps.

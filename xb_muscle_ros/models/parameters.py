@@ -10,8 +10,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.mechanisms.base import Parameter
-from xb_muscle_ros.models.registry import EXTRAS, METHODS, MODELS, compose
+from xb_muscle_ros.mechanisms import Parameter
+from xb_muscle_ros.models.composition import distinct
+from xb_muscle_ros.models.registry import BLOCKS, METHODS, MODELS, compose
 
 CONSTANTS: Mapping[str, Parameter] = MappingProxyType(
     {
@@ -25,14 +26,10 @@ CONSTANTS: Mapping[str, Parameter] = MappingProxyType(
 
 
 def _gather() -> Mapping[str, Parameter]:
-    rows: dict[str, Parameter] = {}
-    for model in MODELS:
-        for row in compose(model).parameters:
-            rows.setdefault(row.name, row)
-    further = [method.parameters for method in METHODS.values()] + [extra.parameters for extra in EXTRAS.values()]
-    for row in (row for parameters in further for row in parameters):
-        rows.setdefault(row.name, row)
-    return MappingProxyType(rows)
+    rows = [row for model in MODELS for row in compose(model).parameters]
+    rows += [row for method in METHODS.values() for row in method.parameters]
+    rows += [row for block in BLOCKS for row in block.parameters]
+    return MappingProxyType({row.name: row for row in distinct(rows)})
 
 
 PARAMETERS: Mapping[str, Parameter] = _gather()

@@ -1,4 +1,4 @@
-"""Expressions as straight-line programs: shared terms once, derivatives by the chain rule, printed in Python or C.
+"""Expressions as straight-line programs: shared terms once, derivatives by the chain rule, printed in Python.
 
 Differentiating the program line by line keeps the exponentials that a rate and its derivatives share; differentiating
 the written-out expressions would lose them.
@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import sympy
-from sympy.printing.c import C99CodePrinter
 from sympy.printing.pycode import PythonCodePrinter
 from sympy.simplify.cse_opts import sub_post
 
@@ -126,7 +125,7 @@ def jacobian(of: Program, variables: Sequence[Any], prefix: str) -> tuple[Progra
     return Program(lines, of.results), rows
 
 
-class _OwnCalls:
+class OwnCalls:
     """Functions of `intrinsics` by name, and small whole powers as products, whatever the language.
 
     Mixed into SymPy's printers, which have what is missing here; SymPy has no types to say so.
@@ -142,12 +141,8 @@ class _OwnCalls:
         return _power(self, expr) or str(super()._print_Pow(expr, **how))  # type: ignore[misc]
 
 
-class _Python(_OwnCalls, PythonCodePrinter):
+class _Python(OwnCalls, PythonCodePrinter):
     """Numba code: scalar functions from `math` and `intrinsics`."""
-
-
-class _C(_OwnCalls, C99CodePrinter):
-    """C code with the same operations in the same order."""
 
 
 def _power(printer: Any, expr: Any) -> str | None:
@@ -160,14 +155,8 @@ def _power(printer: Any, expr: Any) -> str | None:
 
 
 _PYTHON = _Python({"fully_qualified_modules": True})
-_C99 = _C()
 
 
 def python(expression: Any) -> str:
     """An expression as Python that Numba compiles."""
     return str(_PYTHON.doprint(expression.evalf() if expression.is_Rational else expression))
-
-
-def c(expression: Any) -> str:
-    """An expression as C99."""
-    return str(_C99.doprint(expression.evalf() if expression.is_Rational else expression))

@@ -16,7 +16,7 @@ from xb_muscle_ros.prove.answers import Answer, Statement
 
 # A global change of rates is what parameters are for: to call it so is right as well.
 _AS_GOOD_AS_PARAMETERS = {Name.TEMPERATURE.value, Name.PHOSPHATE.value}
-_NAMES = frozenset(name.value for name in Name)
+_NAMES = frozenset(name.value for name in FAMILY)
 
 
 @dataclass(frozen=True)

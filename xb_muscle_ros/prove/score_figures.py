@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 
 _FAMILIES = list(dict.fromkeys(FAMILY.values()))
 # Families side by side, artefacts behind.
-_NAMES = [n.value for n in sorted(Name, key=lambda n: (n not in MECHANISMS, _FAMILIES.index(FAMILY[n])))]
+_NAMES = [n.value for n in sorted(FAMILY, key=lambda n: (n not in MECHANISMS, _FAMILIES.index(FAMILY[n])))]
 _TRUTHS = (*_NAMES, "outside", "null")
 _ANSWERS = (*_NAMES, Verdict.UNEXPLAINED.value, Verdict.PARAMETERS.value, Verdict.NONE.value, "other")
 _WORDS = {"null": "nothing", "outside": "outside the library"}

@@ -125,37 +125,3 @@ def smooth_series_extension(force: float, c: float, k: float) -> float:
     if force > 0.0:
         return math.log1p(force / c) - total
     return force / c + total
-
-
-C_SOURCE = """
-static inline double decay(double z, double k) {
-    double kz = k * z;
-    return kz > 36.8 ? 0.0 : exp(-fabs(kz));
-}
-static inline double logistic(double z, double k, double t) { return (z > 0.0 ? 1.0 : t) / (1.0 + t); }
-static inline double softplus(double z, double k, double t) {
-    double above = z > 0.0 ? z : 0.0;
-    if (t < 1e-8) return above + t * (1.0 - 0.5 * t) / k;
-    return above + log1p(t) / k;
-}
-static inline double unit_step(double z) { return z > 0.0 ? 1.0 : 0.0; }
-static inline double positive_part(double z) { return z < 0.0 ? 0.0 : z; }
-static inline double tangent_sinh(double z) {
-    if (z > 12.0) return sinh(12.0) + cosh(12.0) * (z - 12.0);
-    if (z < -12.0) return -sinh(12.0) + cosh(12.0) * (z + 12.0);
-    return sinh(z);
-}
-static inline double tangent_cosh(double z) { return cosh(fmin(fabs(z), 12.0)); }
-static inline double deviation(double v) {
-    double root = sqrt(v * v + 4e-12);
-    return v < 0.0 ? sqrt(2e-12 / (root - v)) : sqrt(0.5 * (v + root));
-}
-static inline double hyperbolic_tangent(double z) { return 1.0 - 2.0 / (exp(2.0 * z) + 1.0); }
-static inline double limited(double z) {
-    return z < 12.0 ? z : 12.0 + 3.0 * hyperbolic_tangent((z - 12.0) / 3.0);
-}
-static inline double limited_slope(double z) {
-    double t = hyperbolic_tangent((z - 12.0) / 3.0);
-    return z < 12.0 ? 1.0 : 1.0 - t * t;
-}
-"""

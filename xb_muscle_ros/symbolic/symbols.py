@@ -2,145 +2,65 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import sympy
-from sympy.core.function import ArgumentIndexError
+
+CALLS: dict[str, str] = {}
+"""Printed as calls of these functions of `intrinsics`, in Python and in C alike: by the name of the SymPy function."""
 
 
-class Decay(sympy.Function):
-    """exp(-|k z|), arguments z and k: what softplus and its derivative share.
+def _function(name: str, call: str, arguments: int, slopes: Callable[..., tuple[Any, ...]] | None = None) -> Any:
+    """A SymPy function.
 
-    Two arguments rather than their product, which SymPy would flatten into z's own factors: the same exponential would
-    then go under two names.
+    Args:
+        name: of its class.
+        call: name of the function of `intrinsics` that computes it.
+        arguments: how many it has.
+        slopes: from the function and its arguments, derivatives by the first of these; None: it is never
+            differentiated.
     """
-
-    nargs = 2
-
-
-class Logistic(sympy.Function):
-    """1/(1 + exp(-k z)); arguments z, k and exp(-|k z|), which was computed before."""
-
-    nargs = 3
-
-    def fdiff(self, argindex: int = 1) -> Any:
-        """d/dz or d/dk; the third argument follows the others."""
-        z, k, _ = self.args
-        return (k, z, sympy.Integer(0))[argindex - 1] * self * (1 - self)
+    members: dict[str, Any] = {"nargs": arguments, "__module__": __name__}
+    if slopes is not None:
+        members["fdiff"] = lambda self, argindex=1: slopes(self, *self.args)[argindex - 1]
+    CALLS[name] = call
+    return type(name, (sympy.Function,), members)
 
 
-class Softplus(sympy.Function):
-    """ln(1 + exp(k z))/k; arguments z, k and exp(-|k z|), which was computed before."""
+_NONE = sympy.Integer(0)
 
-    nargs = 3
-
-    def fdiff(self, argindex: int = 1) -> Any:
-        """d/dz or d/dk; the third argument follows the others."""
-        z, k, decay = self.args
-        if argindex == 1:
-            return Logistic(z, k, decay)
-        if argindex == 2:
-            return (z * Logistic(z, k, decay) - self) / k
-        return sympy.Integer(0)
-
-
-class UnitStep(sympy.Function):
-    """1 where z > 0, else 0."""
-
-    nargs = 1
-
-    def fdiff(self, argindex: int = 1) -> Any:
-        """Zero but at the step itself."""
-        return sympy.Integer(0)
-
-
-class Positive(sympy.Function):
-    """max(z, 0)."""
-
-    nargs = 1
-
-    def fdiff(self, argindex: int = 1) -> Any:
-        """d/dz; at the kink the derivative from below."""
-        return UnitStep(self.args[0])
-
-
-class HyperbolicTangent(sympy.Function):
-    """tanh(z). SymPy's own asks at every turn whether its argument is real, which took a quarter of the time."""
-
-    nargs = 1
-
-    def fdiff(self, argindex: int = 1) -> Any:
-        """d/dz."""
-        return 1 - self**2
-
-
-class TangentCosh(sympy.Function):
-    """cosh(z) up to |z| = 12, constant beyond: the derivative of `TangentSinh`. Never differentiated itself."""
-
-    nargs = 1
-
-
-class TangentSinh(sympy.Function):
-    """sinh(z) up to |z| = 12, its tangent there beyond."""
-
-    nargs = 1
-
-    def fdiff(self, argindex: int = 1) -> Any:
-        """d/dz."""
-        return TangentCosh(self.args[0])
-
-
-class LimitedSlope(sympy.Function):
-    """Derivative of `Limited`. Never differentiated itself."""
-
-    nargs = 1
-
-
-class Limited(sympy.Function):
-    """Z up to 12, levelling off at 15 beyond: see `ops.limited`."""
-
-    nargs = 1
-
-    def fdiff(self, argindex: int = 1) -> Any:
-        """d/dz."""
-        return LimitedSlope(self.args[0])
-
-
-class Deviation(sympy.Function):
-    """sqrt((v + sqrt(v² + 4e-12))/2): see `ops.deviation`."""
-
-    nargs = 1
-
-    def fdiff(self, argindex: int = 1) -> Any:
-        """d/dv."""
-        return self / (2 * sympy.sqrt(self.args[0] ** 2 + 4e-12))
-
-
-class SmoothSeriesExtension(sympy.Function):
-    """Integral of dF/(Softplus(F, k) + c) from 0 to F; arguments F, c, k."""
-
-    nargs = 3
-
-    def fdiff(self, argindex: int = 1) -> Any:
-        """d/dF: the integrand. Steps move states alone, so that c and k, which are parameters, need no derivative."""
-        if argindex != 1:
-            raise ArgumentIndexError(self, argindex)
-        force, c, k = self.args
-        return 1 / (Softplus(force, k, Decay(force, k)) + c)
-
-
-# Printed as calls of these names, in Python and in C alike.
-CALLS = {
-    "Decay": "decay",
-    "Logistic": "logistic",
-    "Softplus": "softplus",
-    "UnitStep": "unit_step",
-    "Positive": "positive_part",
-    "HyperbolicTangent": "hyperbolic_tangent",
-    "TangentSinh": "tangent_sinh",
-    "TangentCosh": "tangent_cosh",
-    "Deviation": "deviation",
-    "Limited": "limited",
-    "LimitedSlope": "limited_slope",
-    "SmoothSeriesExtension": "smooth_series_extension",
-}
+# Two arguments rather than their product, which SymPy would flatten into z's own factors: the same exponential would
+# then go under two names.
+Decay = _function("Decay", "decay", 2)
+"""exp(-|k z|), arguments z and k: what softplus and its derivative share."""
+Logistic = _function("Logistic", "logistic", 3, lambda f, z, k, _: (k * f * (1 - f), z * f * (1 - f), _NONE))
+"""1/(1 + exp(-k z)); arguments z, k and exp(-|k z|), which was computed before and follows the others."""
+Softplus = _function(
+    "Softplus", "softplus", 3, lambda f, z, k, t: (Logistic(z, k, t), (z * Logistic(z, k, t) - f) / k, _NONE)
+)
+"""ln(1 + exp(k z))/k; arguments z, k and exp(-|k z|), which was computed before and follows the others."""
+UnitStep = _function("UnitStep", "unit_step", 1, lambda *_: (_NONE,))
+"""1 where z > 0, else 0; its derivative is 0 but at the step itself."""
+Positive = _function("Positive", "positive_part", 1, lambda _, z: (UnitStep(z),))
+"""max(z, 0); at the kink the derivative is that from below."""
+HyperbolicTangent = _function("HyperbolicTangent", "hyperbolic_tangent", 1, lambda f, _: (1 - f**2,))
+"""tanh(z). SymPy's own asks at every turn whether its argument is real, which took a quarter of the time."""
+TangentCosh = _function("TangentCosh", "tangent_cosh", 1)
+"""cosh(z) up to |z| = 12, constant beyond: the derivative of `TangentSinh`."""
+TangentSinh = _function("TangentSinh", "tangent_sinh", 1, lambda _, z: (TangentCosh(z),))
+"""sinh(z) up to |z| = 12, its tangent there beyond."""
+LimitedSlope = _function("LimitedSlope", "limited_slope", 1)
+"""Derivative of `Limited`."""
+Limited = _function("Limited", "limited", 1, lambda _, z: (LimitedSlope(z),))
+"""Z up to 12, levelling off at 15 beyond: see `ops.limited`."""
+Deviation = _function("Deviation", "deviation", 1, lambda f, v: (f / (2 * sympy.sqrt(v**2 + 4e-12)),))
+"""sqrt((v + sqrt(v² + 4e-12))/2): see `ops.deviation`."""
+# Steps move states alone, so that c and k, which are parameters, need no derivative.
+SmoothSeriesExtension = _function(
+    "SmoothSeriesExtension",
+    "smooth_series_extension",
+    3,
+    lambda _, force, c, k: (1 / (Softplus(force, k, Decay(force, k)) + c),),
+)
+"""Integral of dF/(Softplus(F, k) + c) from 0 to F; arguments F, c, k; its derivative by F is the integrand."""

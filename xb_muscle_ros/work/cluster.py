@@ -12,6 +12,7 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError
 from typing import TYPE_CHECKING, Any
 
+from xb_muscle_ros import plugins
 from xb_muscle_ros.progress import Progress
 from xb_muscle_ros.work.backend import Backend, Function
 from xb_muscle_ros.work.identity import describe, environment
@@ -38,7 +39,7 @@ class Cluster(Backend):
         """
         self._function, self._address, self._progress, self._quiet = function, address, progress, quiet
         self._client = connect(address)
-        self._perform = _performer()
+        self._perform, self._mechanisms = _performer(), plugins.texts()
         self._name = f"xb_muscle-{uuid.uuid4().hex}"
         self._flying: dict[str, tuple[int, object, Future]] = {}
         self._finished: queue.SimpleQueue[Future] = queue.SimpleQueue()
@@ -61,7 +62,9 @@ class Cluster(Backend):
         key = f"{self._name}-{index}"
         # In bytes: Dask would look into a task for names of its own. And functions of a script go as what they are.
         payload = cloudpickle.dumps((self._function, task))
-        future = self._client.submit(self._perform, payload, environment(), key=key, pure=False, retries=_RETRIES)
+        future = self._client.submit(
+            self._perform, payload, environment(), self._mechanisms, key=key, pure=False, retries=_RETRIES
+        )
         # With the future: Dask drops the work of one that nobody holds.
         self._flying[key] = index, task, future
         future.add_done_callback(self._finished.put)
@@ -147,19 +150,21 @@ class Cluster(Backend):
         self._client.close(timeout=PATIENCE_S)
 
 
-def _performer() -> Callable[[bytes, dict[str, str]], tuple[str, ...]]:
+def _performer() -> Callable[[bytes, dict[str, str], dict[str, str]], tuple[str, ...]]:
     """The function that carries out a task on a worker, if the worker would come to the caller's result.
 
-    It takes what `attempt` takes, and the caller's `environment`; it gives kind and text of the `Outcome`. It is a
-    local function, because those travel whole instead of by name: so it can speak even on a worker that lacks this
-    package, and the scheduler need not have it.
+    It takes what `attempt` takes, the caller's `environment`, and its mechanisms as `plugins.texts` gives them, which a
+    worker takes with its first task; it gives kind and text of the `Outcome`. It is a local function, because those
+    travel whole instead of by name: so it can speak even on a worker that lacks this package, and the scheduler need
+    not have it.
     """
 
-    def perform(payload: bytes, environment: dict[str, str]) -> tuple[str, ...]:
+    def perform(payload: bytes, environment: dict[str, str], mechanisms: dict[str, str]) -> tuple[str, ...]:
         from distributed import get_worker
 
         worker = f"Dask worker {get_worker().address}"
         try:
+            from xb_muscle_ros import plugins
             from xb_muscle_ros.work.identity import differences
             from xb_muscle_ros.work.outcome import attempt
         except ImportError as error:
@@ -167,9 +172,14 @@ def _performer() -> Callable[[bytes, dict[str, str]], tuple[str, ...]]:
                 "user_error",
                 f"{worker} cannot load the package ({error}); install this process's xb_muscle_ros there",
             )
+        if mechanisms and not plugins.files():
+            plugins.use(mechanisms)
         unlike = differences(environment)
         if unlike:
-            return "user_error", f"{worker} has {unlike}; give workers the same environment as this process"
+            return (
+                "user_error",
+                f"{worker} has {unlike}; give workers the same environment as this process, or start them anew",
+            )
         return tuple(attempt(payload))
 
     return perform

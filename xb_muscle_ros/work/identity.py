@@ -12,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from xb_muscle_ros import __version__
+from xb_muscle_ros import __version__, plugins
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 # sympy generates the code of a model, so that another version may order its sums otherwise.
@@ -24,7 +24,8 @@ def environment() -> dict[str, str]:
     """The versions that results depend on, by name of what has them."""
     versions = {name: importlib.metadata.version(name) for name in _LIBRARIES}
     python = ".".join(platform.python_version_tuple()[:2])
-    return {"xb_muscle_ros": f"{__version__} (source {_source_hash()})", "Python": python, **versions}
+    own = {"mechanisms from outside": plugins.identity()} if plugins.identity() != plugins.NONE else {}
+    return {"xb_muscle_ros": f"{__version__} (source {_source_hash()})", "Python": python, **versions, **own}
 
 
 def differences(theirs: dict[str, str]) -> str:

@@ -10,8 +10,9 @@ import pytest
 from written_out import Written, evaluated, some_states, with_ready_heads
 
 from xb_muscle_ros.diagnose.names import MECHANISMS, Name
+from xb_muscle_ros.diagnose.search import whole as whole_module
 from xb_muscle_ros.diagnose.search.system import System
-from xb_muscle_ros.diagnose.search.whole import FRAMES, absent, beside, frame_of, only, whole
+from xb_muscle_ros.diagnose.search.whole import FRAMES, beside, frame_of, only, together, whole
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
@@ -122,14 +123,14 @@ def test_what_is_absent_is_the_null_of_the_catalogue() -> None:
         entry = CATALOGUE[name.value]
         if entry.effect is None and name is not Name.THICK_FILAMENT_COOPERATIVITY:
             assert name in FRAMES
-            assert absent(name) == {}
+            assert entry.absent == {}
         elif name is Name.THICK_FILAMENT_COOPERATIVITY:
-            assert absent(name) == {"J2": 0.0}
+            assert entry.absent == {"J2": 0.0}
         elif name is Name.FILAMENT_FRICTION:
             # Links that never slip: absent friction has no steps halved.
-            assert absent(name) == {"friction_force": 0.0, "friction_way": 1.0}
+            assert entry.absent == {"friction_force": 0.0, "friction_way": 1.0}
         else:
-            assert absent(name) == {entry.effect: 0.0}
+            assert entry.absent == {entry.effect: 0.0}
 
 
 def test_frames_and_mechanisms_that_a_model_has_are_not_beside_it() -> None:
@@ -142,6 +143,14 @@ def test_frames_and_mechanisms_that_a_model_has_are_not_beside_it() -> None:
     assert Name.WEAKLY_BOUND_HEADS not in beside(given_fibre("hill"))
     with pytest.raises(UserError, match="part of this model already"):
         whole(given_fibre("3state_coop"), FRAMES[:1])
+
+
+def test_mechanisms_that_take_one_place_do_not_go_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert together(MECHANISMS)
+    taken = {"phosphate": "detachment", "forcible_detachment": "detachment"}
+    monkeypatch.setattr(whole_module, "place_of", lambda name: taken.get(name, ""))
+    assert not together(MECHANISMS)
+    assert together([Name.PHOSPHATE, Name.PCA_SHIFT])
 
 
 def test_a_mechanism_of_the_fibre_s_own_stays() -> None:

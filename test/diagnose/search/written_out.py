@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from xb_muscle_ros.mechanisms.extra import InSeries
+from xb_muscle_ros.mechanisms import InSeries
 from xb_muscle_ros.models.composition import INPUTS, OUTPUTS, Equations
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.program import python

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from xb_muscle_ros.diagnose.answers import FAMILY, NAMES
 from xb_muscle_ros.diagnose.component import NAMED, SURE, Component, Kind, OfFibre, Parameter
 from xb_muscle_ros.diagnose.inference.averaging import Averaged, averaged, grouped
 from xb_muscle_ros.diagnose.inference.calibration import (
@@ -20,7 +21,7 @@ from xb_muscle_ros.diagnose.inference.calibration import (
 from xb_muscle_ros.diagnose.inference.heldout import HeldOut
 from xb_muscle_ros.diagnose.inference.population import distribution
 from xb_muscle_ros.diagnose.inference.shares import unique
-from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
+from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import Names, ordered
@@ -69,7 +70,7 @@ class Judged:
     @property
     def groups(self) -> list[tuple[Name, ...]]:
         """Components as names that stand together."""
-        names = [n for n in Name if any(n in s for s in self.averages.sets)]
+        names = [n for n in NAMES if any(n in s for s in self.averages.sets)]
         return grouped(self.averages, names)
 
     def probability(self, group: Sequence[Name], fibre: int | None = None) -> float:
@@ -118,7 +119,7 @@ def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Compon
     probability = judged.probability(group)
     own = next((n for n in group if n in chosen), None)
     lead = own or group[0]
-    names = [n for n in Name if n not in group]
+    names = [n for n in NAMES if n not in group]
     rivals = judged.averages.rivals(lead, [n for n in names if (n in MEASUREMENT) == (lead in MEASUREMENT)])
     without = tuple(n for n in chosen if n is not own)
     share, gain = 0.0, None

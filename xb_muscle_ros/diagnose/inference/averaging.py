@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
+from xb_muscle_ros.diagnose.answers import FAMILY, NAMES
+from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import Names, without
 
@@ -71,7 +72,7 @@ class Averaged:
         Without them and their families: kin that does as well in their place does not make them idle.
         """
         wanted = set(names)
-        kin = {n for n in Name if FAMILY[n] in {FAMILY[w] for w in wanted}}
+        kin = {n for n in NAMES if FAMILY[n] in {FAMILY[w] for w in wanted}}
         here = np.array([bool(wanted & set(s)) for s in self.sets])
         without = np.array([not kin & set(s) for s in self.sets])
         if not np.any(here) or not np.any(without):

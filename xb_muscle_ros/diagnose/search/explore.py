@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from xb_muscle_ros.diagnose.answers import NAMES
 from xb_muscle_ros.diagnose.inference.population import Estimate, adjustment
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search.descent import Fit, fit_task
 from xb_muscle_ros.diagnose.search.promise import Linear, Promise, promise
 from xb_muscle_ros.diagnose.search.system import Names, System, label, ordered, without
-from xb_muscle_ros.diagnose.search.whole import beside
+from xb_muscle_ros.diagnose.search.whole import beside, together
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.work import Options, run
@@ -169,7 +170,8 @@ class Explorer:
     def candidates(self, names: Names) -> list[Name]:
         """What may be put beside a set."""
         allowed = set.intersection(*(set(beside(s.fibre)) for s in self.systems))
-        return [n for n in Name if (n in allowed or n in MEASUREMENT) and n not in names]
+        beside_it = [n for n in NAMES if (n in allowed or n in MEASUREMENT) and n not in names]
+        return [n for n in beside_it if together((*names, n))]
 
     def promises(self, names: Names) -> dict[Name, list[Promise]]:
         """What every candidate promises beside a set, in every fibre."""

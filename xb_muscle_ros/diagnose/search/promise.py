@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from xb_muscle_ros.diagnose.answers import MECHANISMS
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search.descent import Descent, Fit
 from xb_muscle_ros.diagnose.search.system import BEYOND, System
-from xb_muscle_ros.diagnose.search.whole import FRAMES
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.fit.training import Training
@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 
 # A mechanism's line is followed this far either way, in units of its start, where the fit begins.
 _LEAST_SHARE, _MOST_SHARE = 0.1, 8.0
-BLIND = tuple(n for n in (*FRAMES, Name.THICK_FILAMENT_COOPERATIVITY) if n is not Name.HALF_SARCOMERE_SPREAD)
+BLIND = tuple(n for n in MECHANISMS if CATALOGUE[n].effect is None)
 """Mechanisms that only a fit can tell: no line leads from their absence to them."""
 
 

@@ -9,16 +9,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from xb_muscle_ros.diagnose.answers import NAMES
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search.thinning import thinned
-from xb_muscle_ros.diagnose.search.whole import _SWITCHED, frame_of, whole
+from xb_muscle_ros.diagnose.search.whole import frame_of, whole
 from xb_muscle_ros.fit.coordinates import Coordinate, fault_coordinates, mechanism_coordinates, parameter_coordinates
 from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.fit.features import F0_ANCHOR, Feature
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS, ORDINARY
-from xb_muscle_ros.models.catalogue import CATALOGUE, Entry
+from xb_muscle_ros.mechanisms import Entry
+from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.fibre_file import Fibre
 
 Array = npt.NDArray[np.float64]
@@ -34,7 +36,7 @@ BEYOND = 6.0
 
 def ordered(names: Collection[Name]) -> Names:
     """Names of a set in their usual order, each once."""
-    return tuple(name for name in Name if name in set(names))
+    return tuple(name for name in NAMES if name in set(names))
 
 
 def without(names: Names, name: Name) -> Names:
@@ -125,7 +127,7 @@ class System:
             start = entry.starting_values(self.fibre.values)[0]
             # What the catalogue starts from besides what is fitted, such as a rate of rebinding.
             present |= {n: float(v) for n, v in start.items() if n in present}
-            present |= {key: _usual(key) for key in _SWITCHED.get(name, {})}
+            present |= {key: _usual(key) for key in entry.off if key not in entry.parameters}
             coordinates += _of_mechanism(entry, self.fibre.values, present)
         for c in coordinates:
             present[c.name] = values.get(c.name, present[c.name])

@@ -9,30 +9,20 @@ tearing is absent at k = 0, so that these need no frames.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
-from xb_muscle_ros.diagnose.names import MECHANISMS, Name
+from xb_muscle_ros.diagnose.answers import MECHANISMS
+from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.parameters import complete
-from xb_muscle_ros.models.registry import compose, model_of_set, row_of, with_mechanisms
+from xb_muscle_ros.models.registry import compose, model_of_set, place_of, row_of, with_mechanisms
 
-FRAMES = (Name.THIN_FILAMENT_COOPERATIVITY, Name.SERIES_COMPLIANCE, Name.HALF_SARCOMERE_SPREAD)
+FRAMES = tuple(Name(name) for name, entry in CATALOGUE.items() if entry.frame)
 """Mechanisms that are another model rather than a value."""
-# Shapes at which what is absent costs no steps either: friction whose links never slip.
-_IDLE: Mapping[Name, Mapping[str, float]] = {Name.FILAMENT_FRICTION: {"friction_way": 1.0}}
-_SWITCHED: Mapping[Name, Mapping[str, float]] = {Name.THICK_FILAMENT_COOPERATIVITY: {"J2": 0.0}}
-
-
-def absent(name: Name) -> dict[str, float]:
-    """Values of parameters at which a mechanism of a frame does exactly nothing."""
-    effect = CATALOGUE[name.value].effect
-    return (
-        dict(_SWITCHED[name]) if name in _SWITCHED else {} if effect is None else {effect: 0.0, **_IDLE.get(name, {})}
-    )
 
 
 def beside(fibre: Fibre) -> tuple[Name, ...]:
@@ -47,6 +37,12 @@ def _goes(model: str, names: tuple[Name, ...]) -> bool:
     except UserError:
         return False
     return True
+
+
+def together(names: Iterable[Name]) -> bool:
+    """Whether no two of some names take the same place in a model."""
+    places = [place for name in set(names) if name in CATALOGUE and (place := place_of(name))]
+    return len(places) == len(set(places))
 
 
 def frame_of(names: Iterable[Name]) -> tuple[Name, ...]:
@@ -76,7 +72,7 @@ def whole(fibre: Fibre, frame: Sequence[Name]) -> Fibre:
             if key in needed:
                 values.setdefault(key, value)
         if name not in frame:
-            values |= absent(name)
+            values |= CATALOGUE[name].absent
     full = complete(values, model_of_set(model), f"fibre {fibre.name}, model {model}", fibre.method)
     return replace(fibre, model=model, values=MappingProxyType(full))
 

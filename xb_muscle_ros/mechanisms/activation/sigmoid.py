@@ -1,11 +1,6 @@
 """Activation by calcium without delay, as in the paper's Hill-type models."""
 
-from __future__ import annotations
-
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities
-from xb_muscle_ros.mechanisms.lumped import Activation
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Activation, Expr, Parameter, Quantities, ops
 from xb_muscle_ros.mechanisms.thin_filament.sigmoid import HILL_N, KAPPA
 
 ACT_MAX = Parameter(
@@ -21,7 +16,6 @@ class SigmoidActivation(Activation):
     parameters = (ACT_MAX, KAPPA, HILL_N, AMIN)
 
     def level(self, q: Quantities) -> Expr:
-        """See the class."""
         # The quotient form would overflow for a large n at high calcium; this one cannot.
         sigmoid = q.act_max / (1 + (q.kappa / q.calcium) ** q.n)
         return q.amin + ops.positive(sigmoid - q.amin)

@@ -1,13 +1,18 @@
 """Regular detachment, and heads that are torn off when stretched far: the fourth state."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
+from xb_muscle_ros.mechanisms import (
+    Entry,
+    Expr,
+    GaussianSpread,
+    Parameter,
+    Quantities,
+    State,
+    StepRate,
+    StrainRate,
+    Values,
+)
 from xb_muscle_ros.mechanisms.attachment.gaussian import WIDTH
-from xb_muscle_ros.mechanisms.base import GaussianSpread, Parameter, Quantities, State, StepRate, StrainRate
 from xb_muscle_ros.mechanisms.detachment.regular import RegularDetachment
-from xb_muscle_ros.mechanisms.ops import Expr
 
 _SOURCE = "van der Zee et al. 2026"
 K_FORCIBLE = Parameter(
@@ -37,9 +42,14 @@ class ForcibleDetachment(RegularDetachment):
     name = "forcible"
     parameters = (*RegularDetachment.parameters, K_FORCIBLE, B_REATTACH, CRITICAL, STEEPNESS, WIDTH)
     states = (State("r", "1", "fraction of heads forcibly detached", 0.0, 1.0),)
+    entry = Entry(
+        "heads_under_strain", "forcible detachment", "heads stretched too far are torn off and bind again quickly",
+        "k", 1000.0, {"dLcrit": 0.7},
+        tuple({"k": 500.0, "dLcrit": critical, "b": 1000.0} for critical in (0.7, 1.5, 2.5)),
+        name="forcible_detachment",
+    )  # fmt: skip
 
     def forcible_rates(self, q: Quantities) -> tuple[StrainRate, ...]:
-        """See the class."""
         return (StepRate(q.k, q.dLcrit, q.steepness),)
 
     def reattachment(self, q: Quantities) -> tuple[GaussianSpread, ...]:
@@ -50,6 +60,5 @@ class ForcibleDetachment(RegularDetachment):
         """R itself is the state."""
         return q.r
 
-    def derivatives(self, q: Quantities) -> Mapping[str, Expr]:
-        """See the class."""
+    def derivatives(self, q: Quantities) -> Values:
         return {"r": q.torn_off - q.reattached}

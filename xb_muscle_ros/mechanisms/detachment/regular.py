@@ -1,10 +1,8 @@
 """Detachment by two exponentials of strain: slow at the power stroke, faster to either side."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
-from xb_muscle_ros.mechanisms.base import Detachment, ExponentialRate, Parameter, Quantities, StrainRate
+from xb_muscle_ros.mechanisms import Detachment, ExponentialRate, Parameter, Quantities, StrainRate
 
 _SOURCE = "van der Zee et al. 2026"
 K11 = Parameter(
@@ -24,5 +22,4 @@ class RegularDetachment(Detachment):
     parameters: ClassVar[tuple[Parameter, ...]] = (K11, K12, K21, K22)
 
     def rates(self, q: Quantities) -> tuple[StrainRate, ...]:
-        """See the class."""
         return (ExponentialRate(q.k11, -q.k12), ExponentialRate(q.k21, q.k22))

@@ -1,12 +1,6 @@
 """Active titin: it takes hold of actin when calcium comes, and is a spring from there on."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities, State
-from xb_muscle_ros.mechanisms.extra import Extra
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Parameter, Quantities, State, Values
 
 _SOURCE = "Millard, Franklin and Herzog 2024; this package"
 STIFFNESS = Parameter("titin_stiffness", "F0/L0", "stiffness of titin held by actin", 0.0, 100.0, 0.0, _SOURCE)
@@ -28,13 +22,17 @@ class ActiveTitin(Extra):
     name = "active_titin"
     parameters = (STIFFNESS, RELEASE, HALF, HILL, REBINDING)
     states = (State("titin_stretch", "L0", "stretch since titin took hold of actin", -100.0, 100.0),)
+    entry = Entry(
+        "calcium_dependent_elasticity", "active titin",
+        "a spring that engages when the fibre is activated and is stretched from there on",
+        "titin_stiffness", 2.0, {"titin_calcium": 0.7, "titin_hill": 0.5, "titin_rebinding": 1.0},
+        tuple({"titin_stiffness": 1.0, "titin_calcium": half} for half in (0.3, 1.0, 4.0)),
+    )  # fmt: skip
 
     def force(self, q: Quantities) -> Expr:
-        """See the class."""
         return q.titin_stiffness * self._held(q) * q.positive(q.titin_stretch)
 
-    def derivatives(self, q: Quantities) -> Mapping[str, Expr]:
-        """See the class."""
+    def derivatives(self, q: Quantities) -> Values:
         x = q.titin_stretch
         forgotten = q.titin_release * (1 - self._held(q)) * x
         return {"titin_stretch": q.velocity - forgotten + q.titin_rebinding * q.positive(-x)}

@@ -1,12 +1,6 @@
 """Friction that bound heads make: links are elastic for a short way, slip, and take time to form anew."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities, State
-from xb_muscle_ros.mechanisms.extra import Extra, Needs
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Needs, Parameter, Quantities, State, Values
 
 _SOURCE = (
     "Campbell and Lakie 1998 (J Physiol 510:941), links that slip and form anew; "
@@ -40,13 +34,19 @@ class FilamentFriction(Extra):
         ),
         State("friction_slipped", "1", "share of links that have slipped and not yet formed anew", 0.0, 1.0),
     )
+    entry = Entry(
+        "weak_binding", "friction of bound heads",
+        "links of bound heads are elastic for a short way, slip, and take time to form anew",
+        "friction_force", 0.4, {"friction_way": 0.7, "friction_release": 1.5},
+        tuple({"friction_force": 0.3, "friction_way": 0.007, "friction_release": rate} for rate in (8.0, 45.0)),
+        # Links that never slip: absent friction halves no steps.
+        off={"friction_way": 1.0},
+    )  # fmt: skip
 
     def force(self, q: Quantities) -> Expr:
-        """See the class."""
         return q.friction_force * q.q0 * q.friction
 
-    def derivatives(self, q: Quantities) -> Mapping[str, Expr]:
-        """See the class."""
+    def derivatives(self, q: Quantities) -> Values:
         v, total = q.velocity, q.friction
         holding = 1 - q.friction_slipped
         y = total / (holding + _FEW)

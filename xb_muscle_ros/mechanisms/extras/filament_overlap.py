@@ -1,11 +1,6 @@
 """Filament overlap: how many of the available sites heads can reach depends on length."""
 
-from __future__ import annotations
-
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities
-from xb_muscle_ros.mechanisms.extra import Extra
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Parameter, Quantities, ops
 
 OVERLAP = Parameter(
     "overlap_per_length", "1/L0",
@@ -26,8 +21,12 @@ class FilamentOverlap(Extra):
 
     name = "filament_overlap"
     parameters = (OVERLAP, EDGE)
+    entry = Entry(
+        "length_dependence", "filament overlap", "the number of heads within reach changes with length",
+        "overlap_per_length", 3.0, {"overlap_edge": 0.02},
+        tuple({"overlap_per_length": -1.5, "overlap_edge": edge} for edge in (-0.06, -0.01)),
+    )  # fmt: skip
 
     def overlap(self, q: Quantities) -> Expr:
-        """See the class."""
         beyond = q.positive(q.sarcomere_change - q.overlap_edge) - q.positive(-q.overlap_edge)
         return ops.exp(q.overlap_per_length * beyond)

@@ -1,12 +1,6 @@
 """Half-sarcomere spread: a stronger and a weaker half-sarcomere in series, which move against each other."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities, State
-from xb_muscle_ros.mechanisms.extra import Chain, InSeries, Unit
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Chain, Entry, Expr, InSeries, Parameter, Quantities, State, Unit, Values
 
 _SOURCE = "Campbell et al. 2011; this package"
 SPREAD = Parameter(
@@ -31,9 +25,15 @@ class HalfSarcomereSpread(InSeries):
     name = "half_sarcomere_spread"
     parameters = (SPREAD, STIFFNESS)
     states = (State("hs_difference", "power strokes", "length of the stronger less that of the weaker one", -1e3, 1e3),)
+    entry = Entry(
+        "heterogeneity", "uneven half-sarcomeres",
+        "stronger half-sarcomeres shorten at the cost of weaker ones in series",
+        "hs_spread", 0.1, {"hs_stiffness": 1.0},
+        tuple({"hs_spread": s, "hs_stiffness": k} for s, k in ((0.03, 0.0005), (0.08, 0.003), (0.1, 0.03))),
+        reach=6.0, frame=True,
+    )  # fmt: skip
 
     def chain(self, q: Quantities, own: Unit, other: Unit) -> Chain:
-        """See the class."""
         strong, weak = 1 + q.hs_spread, 1 - q.hs_spread
         tie = q.hs_stiffness * q.hs_difference / 2
         force_a, force_b = strong * own.force + tie, weak * other.force - tie
@@ -45,7 +45,7 @@ class HalfSarcomereSpread(InSeries):
         def half_difference(velocity: Expr) -> Expr:
             return -((s_a - s_b) * velocity + unequal) / apart
 
-        def derivatives(velocity: Expr) -> Mapping[str, Expr]:
+        def derivatives(velocity: Expr) -> Values:
             return {"hs_difference": 2 * half_difference(velocity)}
 
         return Chain(

@@ -1,13 +1,6 @@
 """Lattice spacing: heads reach actin more easily where filaments lie closer, as they do in a longer fibre."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities
-from xb_muscle_ros.mechanisms.extra import Extra, Needs
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Entry, Extra, Needs, Parameter, Quantities, Values, ops
 
 LATTICE = Parameter(
     "attachment_per_length", "1/L0", "relative rise of the attachment rate with half-sarcomere length", -50.0, 50.0,
@@ -21,7 +14,11 @@ class LatticeSpacing(Extra):
     name = "lattice_spacing"
     needs = Needs.HEADS
     parameters = (LATTICE,)
+    entry = Entry(
+        "length_dependence", "lattice spacing",
+        "heads attach faster when the fibre is longer and its lattice tighter",
+        "attachment_per_length", 3.0, starts=({"attachment_per_length": 1.5},),
+    )  # fmt: skip
 
-    def modified(self, q: Quantities) -> Mapping[str, Expr]:
-        """See the class."""
+    def modified(self, q: Quantities) -> Values:
         return {"f": q.f * ops.exp(q.attachment_per_length * q.sarcomere_change)}

@@ -1,13 +1,6 @@
 """Length-dependent activation: a longer fibre is more sensitive to calcium."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities
-from xb_muscle_ros.mechanisms.extra import Extra
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Entry, Extra, Parameter, Quantities, Values, ops
 
 SENSITIVITY = Parameter(
     "calcium_per_length", "1/L0", "relative rise of calcium sensitivity with length", -50.0, 50.0, 0.0,
@@ -20,7 +13,10 @@ class LengthDependentActivation(Extra):
 
     name = "length_dependent_activation"
     parameters = (SENSITIVITY,)
+    entry = Entry(
+        "length_dependence", "length-dependent activation", "a longer fibre is more sensitive to calcium",
+        "calcium_per_length", 3.0, starts=({"calcium_per_length": 1.5},),
+    )  # fmt: skip
 
-    def modified(self, q: Quantities) -> Mapping[str, Expr]:
-        """See the class."""
+    def modified(self, q: Quantities) -> Values:
         return {"calcium": q.calcium * ops.exp(q.calcium_per_length * q.length_change)}

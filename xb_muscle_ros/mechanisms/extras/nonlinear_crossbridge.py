@@ -1,10 +1,6 @@
 """Non-linear cross-bridges: a head's force bends away from its strain."""
 
-from __future__ import annotations
-
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities
-from xb_muscle_ros.mechanisms.extra import Extra, HeadMoments, Needs
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Moments, Needs, Parameter, Quantities
 
 CURVATURE = Parameter(
     "head_curvature", "1", "curvature of a head's force over strain: stiffer stretched, softer compressed", -0.3, 0.5,
@@ -22,7 +18,11 @@ class NonlinearCrossbridge(Extra):
     name = "nonlinear_crossbridge"
     needs = Needs.HEADS
     parameters = (CURVATURE,)
+    entry = Entry(
+        "heads_under_strain", "non-linear cross-bridges",
+        "the stiffness of a head changes with how far it is stretched",
+        "head_curvature", 0.1, starts=({"head_curvature": 0.05},), reach=5.0,
+    )  # fmt: skip
 
-    def head_force(self, q: Quantities, m: HeadMoments) -> Expr:
-        """See the class."""
+    def head_force(self, q: Quantities, m: Moments) -> Expr:
         return q.head_curvature * (m.m0 + 2 * m.m1 + m.m2)

@@ -1,13 +1,6 @@
 """Persistent thick filament: it switches more slowly than force does, on and off."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities
-from xb_muscle_ros.mechanisms.extra import Extra, Needs
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Entry, Extra, Needs, Parameter, Quantities, Values, ops
 
 PERSISTENCE = Parameter(
     "thick_persistence", "1", "natural logarithm of the factor by which thick-filament switching is slower", -5.0, 10.0,
@@ -25,8 +18,12 @@ class PersistentThickFilament(Extra):
     name = "persistent_thick_filament"
     needs = Needs.SUPER_RELAXED
     parameters = (PERSISTENCE,)
+    entry = Entry(
+        "regulation", "persistent thick filament",
+        "heads that force has woken go to rest more slowly than the model has it",
+        "thick_persistence", 2.0, starts=({"thick_persistence": 2.0},), reach=4.0,
+    )  # fmt: skip
 
-    def modified(self, q: Quantities) -> Mapping[str, Expr]:
-        """See the class."""
+    def modified(self, q: Quantities) -> Values:
         slower = ops.exp(-q.thick_persistence)
         return {"J1": q.J1 * slower, "J2": q.J2 * slower}

@@ -1,9 +1,6 @@
 """Phosphate: heads detach by reversing the power stroke."""
 
-from __future__ import annotations
-
-from xb_muscle_ros.mechanisms.base import ExponentialRate, Parameter, Quantities, StrainRate
-from xb_muscle_ros.mechanisms.extra import Extra, Needs
+from xb_muscle_ros.mechanisms import Entry, ExponentialRate, Extra, Needs, Parameter, Quantities, StrainRate
 
 REVERSAL = Parameter(
     "phosphate_detachment", "1/s", "detachment by reversal of the power stroke, the same at every strain", 0.0, 1e4,
@@ -17,7 +14,10 @@ class Phosphate(Extra):
     name = "phosphate"
     needs = Needs.HEADS
     parameters = (REVERSAL,)
+    entry = Entry(
+        "rates", "phosphate", "phosphate in the solution lets heads detach before they have done their work",
+        "phosphate_detachment", 5.0, starts=({"phosphate_detachment": 2.0},),
+    )  # fmt: skip
 
     def detachment(self, q: Quantities) -> tuple[StrainRate, ...]:
-        """See the class."""
         return (ExponentialRate(q.phosphate_detachment, 0),)

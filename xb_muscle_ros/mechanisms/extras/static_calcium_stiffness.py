@@ -1,10 +1,6 @@
 """Static stiffness: a spring that calcium, not force, makes stiff."""
 
-from __future__ import annotations
-
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities
-from xb_muscle_ros.mechanisms.extra import Extra
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Parameter, Quantities
 
 _SOURCE = "Bagni et al. 1994; this package"
 STIFFNESS = Parameter("calcium_stiffness", "F0/L0", "static stiffness at full calcium", 0.0, 100.0, 0.0, _SOURCE)
@@ -17,7 +13,12 @@ class StaticCalciumStiffness(Extra):
 
     name = "static_calcium_stiffness"
     parameters = (STIFFNESS, HALF, HILL)
+    entry = Entry(
+        "calcium_dependent_elasticity", "static calcium-dependent stiffness",
+        "a spring whose stiffness follows calcium, not force",
+        "calcium_stiffness", 2.0, {"stiffness_calcium": 0.7, "stiffness_hill": 0.5},
+        tuple({"calcium_stiffness": 1.0, "stiffness_calcium": half} for half in (0.3, 1.0, 4.0)),
+    )  # fmt: skip
 
     def force(self, q: Quantities) -> Expr:
-        """See the class."""
         return q.calcium_stiffness * q.length_change / (1 + (q.stiffness_calcium / q.calcium) ** q.stiffness_hill)

@@ -1,12 +1,6 @@
 """Temperature: all rates faster or slower together."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities
-from xb_muscle_ros.mechanisms.extra import Extra
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Entry, Extra, Parameter, Quantities, Values
 
 _SOURCE = "Ranatunga 1996; this package"
 OFFSET = Parameter("warmer", "K", "temperature above that of the parameter set", -30.0, 30.0, 0.0, _SOURCE)
@@ -20,8 +14,11 @@ class Temperature(Extra):
 
     name = "temperature"
     parameters = (OFFSET, Q10)
+    entry = Entry(
+        "rates", "temperature", "the recordings were made warmer or colder than the model assumes",
+        "warmer", 3.0, starts=({"warmer": 2.0},), reach=5.0,
+    )  # fmt: skip
 
-    def modified(self, q: Quantities) -> Mapping[str, Expr]:
-        """See the class."""
+    def modified(self, q: Quantities) -> Values:
         factor = q.q10 ** (q.warmer / 10)
         return {name: getattr(q, name) * factor for name in _RATES if name in q}

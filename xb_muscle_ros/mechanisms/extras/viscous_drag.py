@@ -1,10 +1,6 @@
 """Viscous drag: a force proportional to the fibre's velocity."""
 
-from __future__ import annotations
-
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities
-from xb_muscle_ros.mechanisms.extra import Extra
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Parameter, Quantities
 
 DRAG = Parameter("drag", "F0 s/L0", "viscous drag of the fibre", 0.0, 10.0, 0.0, "Ford, Huxley and Simmons 1977")
 
@@ -14,7 +10,10 @@ class ViscousDrag(Extra):
 
     name = "viscous_drag"
     parameters = (DRAG,)
+    entry = Entry(
+        "parallel_viscoelasticity", "viscous drag", "a force proportional to the speed of stretch",
+        "drag", 0.02, starts=({"drag": 0.01},),
+    )  # fmt: skip
 
     def force(self, q: Quantities) -> Expr:
-        """See the class."""
         return q.drag * q.velocity

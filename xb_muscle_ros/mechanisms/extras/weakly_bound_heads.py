@@ -1,12 +1,6 @@
 """Weakly bound heads: a population that attaches and detaches fast and resists movement while it is attached."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities, State
-from xb_muscle_ros.mechanisms.extra import Extra, Needs
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Entry, Expr, Extra, Needs, Parameter, Quantities, State, Values
 
 _SOURCE = "Brenner et al. 1982; this package"
 STIFFNESS = Parameter(
@@ -25,17 +19,21 @@ class WeaklyBoundHeads(Extra):
     needs = Needs.HEADS
     parameters = (STIFFNESS, DETACHMENT)
     states = (State("weak_force", "F0", "force of weakly bound heads", -1e3, 1e3),)
+    entry = Entry(
+        "weak_binding", "weakly bound heads",
+        "heads that bind and let go quickly and hold for a moment when the fibre is stretched",
+        "weak_stiffness", 20.0, {"weak_detachment": 1.0},
+        tuple({"weak_stiffness": 0.02 * rate, "weak_detachment": rate} for rate in (100.0, 400.0, 1500.0)),
+        reach=100.0,
+    )  # fmt: skip
 
     def inner_force(self, q: Quantities) -> Expr:
-        """See the class."""
         return q.weak_force / q.Fscale
 
     def inner_kinetics(self, q: Quantities) -> tuple[Expr, Expr]:
-        """See the class."""
         return -q.weak_detachment * q.weak_force / q.Fscale, self._stiffness(q) / q.Fscale
 
-    def derivatives(self, q: Quantities) -> Mapping[str, Expr]:
-        """See the class."""
+    def derivatives(self, q: Quantities) -> Values:
         return {"weak_force": self._stiffness(q) * q.ce_velocity - q.weak_detachment * q.weak_force}
 
     def _stiffness(self, q: Quantities) -> Expr:

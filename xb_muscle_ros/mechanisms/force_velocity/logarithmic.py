@@ -1,11 +1,6 @@
 """The continuously differentiable force-velocity relation of De Groote et al. 2016."""
 
-from __future__ import annotations
-
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities
-from xb_muscle_ros.mechanisms.lumped import ForceVelocity
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Expr, ForceVelocity, Parameter, Quantities, ops
 
 _SOURCE = "De Groote et al. 2016"
 VMAX = Parameter("vmax", "power strokes/s", "unloaded shortening velocity", 1e-3, 1e6, None, "van der Zee et al. 2026")
@@ -26,9 +21,7 @@ class LogarithmicForceVelocity(ForceVelocity):
     parameters = (VMAX, E1, E2, E3, E4)
 
     def force(self, q: Quantities, velocity: Expr) -> Expr:
-        """See the class."""
         return q.e1 * ops.asinh(q.e2 * velocity / q.vmax + q.e3) + q.e4
 
     def velocity(self, q: Quantities, force: Expr) -> Expr:
-        """See the class."""
         return q.vmax * (ops.tangent_sinh((force - q.e4) / q.e1) - q.e3) / q.e2

@@ -1,10 +1,6 @@
 """Parallel spring of the released sets: linear above rest, with a constant offset."""
 
-from __future__ import annotations
-
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Parallel, Parameter, Quantities
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Expr, Parallel, Parameter, Quantities, ops
 
 KPE = Parameter("kpe", "F0/power stroke", "stiffness of the parallel spring", 0.0, 10.0, 0.0, "van der Zee et al. 2026")
 FPE0 = Parameter("Fpe0", "F0", "force of the parallel element at rest length", -1.0, 1.0, 0.0, "as released")
@@ -17,5 +13,4 @@ class LinearParallel(Parallel):
     parameters = (KPE, FPE0)
 
     def force(self, q: Quantities) -> Expr:
-        """See the class."""
         return q.kpe * q.gamma * ops.positive(q.length_change) + q.Fpe0

@@ -1,10 +1,6 @@
 """Parallel spring of the paper: linear above its resting length, with a smooth transition."""
 
-from __future__ import annotations
-
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Parallel, Parameter, Quantities
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Expr, Parallel, Parameter, Quantities, ops
 from xb_muscle_ros.mechanisms.parallel.linear import KPE
 
 LPE0 = Parameter(
@@ -24,9 +20,8 @@ class SoftplusParallel(Parallel):
     rest, Fpe0, is the same as lpe0 = -Fpe0/(kpe gamma) there.
     """
 
-    name = "softplus"
+    name = suffix = "softplus"
     parameters = (KPE, LPE0, SHARPNESS)
 
     def force(self, q: Quantities) -> Expr:
-        """See the class."""
         return q.kpe * q.gamma * ops.softplus(q.length_change - q.lpe0, q.pe_sharpness)

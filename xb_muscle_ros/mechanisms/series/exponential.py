@@ -1,12 +1,8 @@
 """Exponential series spring."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Balance, Contractile, Parameter, Quantities, Series, State
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Balance, Contractile, Entry, Expr, Parameter, Quantities, Series, State, ops
 
 KSE = Parameter("kse", "1/power stroke", "exponent of the series spring", 1e-4, 100.0, None, "van der Zee et al. 2026")
 KSE0 = Parameter(
@@ -16,14 +12,10 @@ KSE0 = Parameter(
 
 EXTENSION = State("l_se", "power strokes", "length of the series element beyond slack", -1e5, 1e5)
 SMOOTH_STIFFNESS = Parameter(
-    "smooth_stiffness",
-    "1",
-    "1 where the released set also smoothed the heads' stiffness in the velocity constraint (v3), 0 where not",
-    0.0,
-    1.0,
-    0.0,
-    "as released",
-)
+    "smooth_stiffness", "1",
+    "1 where the released set also smoothed the heads' stiffness in the velocity constraint (v3), 0 where not", 0.0,
+    1.0, 0.0, "as released",
+)  # fmt: skip
 
 
 class ExponentialSeries(Series):
@@ -37,6 +29,11 @@ class ExponentialSeries(Series):
     name = "exponential"
     parameters: ClassVar[tuple[Parameter, ...]] = (KSE, KSE0, SMOOTH_STIFFNESS)
     length_states = (EXTENSION,)
+    entry = Entry(
+        "compliance", "series compliance", "a spring in series takes up part of the length change",
+        None, shape={"kse": 1.0, "kse0": 1.0}, starts=({"kse": 0.3, "kse0": 0.1}, {"kse": 1.0, "kse0": 0.1}),
+        frame=True, name="series_compliance",
+    )  # fmt: skip
 
     def ce_velocity(self, q: Quantities) -> Expr:
         """U = (gamma v k_se - dF_kin)/(dF/dx + k_se)."""

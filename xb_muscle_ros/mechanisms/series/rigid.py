@@ -1,18 +1,14 @@
 """No series compliance: the contractile element takes the whole length change."""
 
-from __future__ import annotations
-
-from xb_muscle_ros.mechanisms.base import Balance, Contractile, Quantities, Series
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Balance, Contractile, Expr, Quantities, Series
 
 
 class RigidSeries(Series):
     """The family's null block: u = gamma v."""
 
-    name = "rigid"
+    name = suffix = "rigid"
 
     def ce_velocity(self, q: Quantities) -> Expr:
-        """See the class."""
         return q.gamma * q.velocity
 
     def extension(self, q: Quantities) -> Expr:

@@ -1,12 +1,6 @@
 """Exponential series spring that goes slack: a tension element, which does not push."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
-from xb_muscle_ros.mechanisms import ops
-from xb_muscle_ros.mechanisms.base import Quantities
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Expr, Quantities, Values, ops
 from xb_muscle_ros.mechanisms.series.exponential import EXTENSION, KSE, KSE0, ExponentialSeries
 
 # Rate at which a difference between spring and heads that rounding has left dies away, 1/s.
@@ -22,12 +16,11 @@ class SlackSeries(ExponentialSeries):
     to it. Taut, both springs are the same; smoothing leaves this one alone.
     """
 
-    name = "slack"
+    name = suffix = "slack"
     parameters = (KSE, KSE0)
     states = (EXTENSION,)
 
     def force(self, q: Quantities) -> Expr:
-        """See the class."""
         return q.kse0 * (ops.exp(q.kse * ops.positive(q.l_se)) - 1)
 
     def ce_velocity(self, q: Quantities) -> Expr:
@@ -42,6 +35,6 @@ class SlackSeries(ExponentialSeries):
         """The state."""
         return q.l_se
 
-    def derivatives(self, q: Quantities) -> Mapping[str, Expr]:
+    def derivatives(self, q: Quantities) -> Values:
         """What the fibre lengthens beyond the contractile element."""
         return {"l_se": q.gamma * q.velocity - q.ce_velocity}

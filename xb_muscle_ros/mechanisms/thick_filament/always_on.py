@@ -1,11 +1,6 @@
 """Thick filament without regulation: every head that is not attached can attach."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
-from xb_muscle_ros.mechanisms.base import Quantities, ThickFilament
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Expr, Quantities, ThickFilament
 
 
 class AlwaysOnThickFilament(ThickFilament):
@@ -14,9 +9,4 @@ class AlwaysOnThickFilament(ThickFilament):
     name = "always_on"
 
     def ready_heads(self, q: Quantities) -> Expr:
-        """See the class."""
         return 1 - q.q0 - q.forcibly_detached
-
-    def derivatives(self, q: Quantities) -> Mapping[str, Expr]:
-        """No state."""
-        return {}

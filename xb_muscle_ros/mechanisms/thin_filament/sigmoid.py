@@ -1,11 +1,6 @@
 """Thin filament without cooperativity: a sigmoid of calcium, reached with a short lag."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
-from xb_muscle_ros.mechanisms.base import Parameter, Quantities, ThinFilament
-from xb_muscle_ros.mechanisms.ops import Expr
+from xb_muscle_ros.mechanisms import Expr, Parameter, Quantities, ThinFilament, Values
 from xb_muscle_ros.mechanisms.thin_filament.cooperative import N_ON
 
 KAPPA = Parameter("kappa", "µM", "free calcium that makes half of the sites available", 1e-3, 1e3, None, "as released")
@@ -24,8 +19,7 @@ class SigmoidThinFilament(ThinFilament):
         """N itself is the state."""
         return q.n_on
 
-    def derivatives(self, q: Quantities) -> Mapping[str, Expr]:
-        """See the class."""
+    def derivatives(self, q: Quantities) -> Values:
         # The quotient form would overflow for a large n at high calcium; this one cannot.
         target = 1 / (1 + (q.kappa / q.calcium) ** q.n)
         return {"n_on": (target - q.n_on) / q.tau_act}
