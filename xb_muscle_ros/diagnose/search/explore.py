@@ -53,7 +53,7 @@ class Effort:
     tolerance: float = 0.02
 
 
-QUICK = Effort(steps=5, candidates=4, rivals=2, most=5, tolerance=0.1)
+QUICK: Effort = Effort(steps=5, candidates=4, rivals=2, most=5, tolerance=0.1)
 
 
 def fit_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
