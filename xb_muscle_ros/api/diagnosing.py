@@ -88,7 +88,7 @@ class DiagnosisResult:
         Raises:
             UserError: pandas is not there.
         """
-        return dataframe(asdict(each) for each in self.components)
+        return dataframe({**asdict(each), "kind": each.kind.value} for each in self.components)
 
     def plot(self, which: str = "before_after") -> Figure:
         """One of the report's figures.

@@ -49,7 +49,7 @@ def drawn(draw: Callable[[], object], which: str | None = None) -> Figure:
         draw()
     named: dict[str, Figure] = {made.get_label(): made for made in figures}
     if not named:
-        raise UserError("there is nothing to draw: the result has no trials")
+        raise UserError("this result has nothing to draw")
     if which is None:
         return next(iter(named.values()))
     if which not in named:

@@ -42,6 +42,7 @@ def figure(width_mm: float, height_mm: float) -> Iterator[Any]:
     It is none of pyplot's: a notebook keeps its backend, and nothing has to be closed.
     """
     import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     settings: Any = {
@@ -62,6 +63,7 @@ def figure(width_mm: float, height_mm: float) -> Iterator[Any]:
     }
     with mpl.rc_context(settings):
         made = Figure(figsize=(width_mm / 25.4, height_mm / 25.4), layout="constrained")
+        FigureCanvasAgg(made)
         yield made
         figures = _KEPT.get()
         if figures is not None:
