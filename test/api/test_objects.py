@@ -149,7 +149,7 @@ def test_figures_are_handed_over_and_not_written(
     assert [path.name for path in tmp_path.iterdir()] == ["made.png"]
     with pytest.raises(xb.UserError, match="nothing to draw"):
         xb.evaluate(made, measured_only=True, processes=0, tell=lambda line: None).plot("profile")
-    with pytest.raises(xb.UserError, match="figure 'profile' is not among those of this result.*force_rmsd"):
+    with pytest.raises(xb.UserError, match=r"figure 'profile' is not among those of this result.*force_rmsd"):
         xb.evaluate(made, model="2state", processes=0, tell=lambda line: None).plot("profile")
 
 

@@ -151,8 +151,8 @@ def check_out(out: Path, overwrite: bool) -> Path:
 
 
 def fit(
-    trials: TrialsLike = (),
-    fibre: FibreLike | None = None,
+    trials: TrialsLike,
+    fibre: FibreLike,
     *,
     model: str | None = None,
     method: str | None = None,
@@ -240,8 +240,6 @@ def fit(
         >>> round(found.values["f"])
         95
     """
-    if fibre is None:
-        raise UserError("a fit needs a fibre to start from; give fibre")
     if not 0.5 <= level < 1.0:
         raise UserError(f"--level is {level:g}; allowed is 0.5 up to below 1")
     for what, given, allowed in (("window", window, ("paper", "whole")), ("split", split, (None, "paper"))):
