@@ -1,5 +1,6 @@
 """Build script: read by pip and by colcon (package.xml holds the ROS side of the same facts)."""
 
+import re
 from pathlib import Path
 
 from setuptools import find_packages, setup
@@ -12,16 +13,24 @@ def files(pattern: str) -> list[str]:
     return sorted(str(path) for path in Path().glob(pattern) if path.is_file())
 
 
+def version() -> str:
+    """Return the version, which stands in the package."""
+    found = re.search(r'^__version__ = "(.+)"$', Path(NAME, "__init__.py").read_text(encoding="utf-8"), re.MULTILINE)
+    if found is None:
+        raise ValueError(f"{NAME}/__init__.py has no line '__version__ = \"...\"'")
+    return found[1]
+
+
 setup(
     name=NAME,
-    version="0.1.0",
+    version=version(),
     description="Cross-bridge muscle for robots and physiologists: fibre length and calcium in, force out",
     license="Apache-2.0",
     maintainer="xb_muscle_ros maintainers",
     maintainer_email="maintainers@users.noreply.github.com",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     package_data={
-        NAME: ["py.typed"],
+        NAME: ["py.typed", "*.pyi"],
         f"{NAME}.bench": ["*.c"],
         f"{NAME}.diagnose.report": ["*.css", "*.yaml", "templates/*.j2"],
         f"{NAME}.plant": ["*.xml"],
@@ -56,10 +65,14 @@ setup(
         "mujoco": ["mujoco>=3.1"],
         "dask": ["cloudpickle>=2.0", "dask>=2024.1", "distributed>=2024.1"],
         "casadi": ["casadi>=3.6"],
+        "pandas": ["pandas>=2.0"],
         "test": [
             "casadi",
             "distributed",
+            "ipykernel",
             "mujoco",
+            "nbclient",
+            "pandas",
             "pytest",
             "pytest-xdist",
             "hypothesis",

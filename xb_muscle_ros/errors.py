@@ -18,6 +18,10 @@ class UserError(Exception):
         super().__init__(" ".join(message.split()))
 
 
+class DataWarning(UserWarning):
+    """Something was guessed, left out or taken for granted; one line that names it."""
+
+
 class StateViolation(UserError):
     """The integration left the states a fibre can have.
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 import setuptools
+import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "xb_muscle_ros"
@@ -74,6 +75,8 @@ def test_setup_and_manifest_agree(arguments: dict[str, Any], manifest: ElementTr
 
 def test_version_is_the_one_the_package_tells(arguments: dict[str, Any]) -> None:
     assert f'__version__ = "{arguments["version"]}"' in (PACKAGE / "__init__.py").read_text()
+    assert re.search(rf"^## \[{re.escape(arguments['version'])}\]", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)
+    assert yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"] == arguments["version"]
 
 
 def test_every_folder_with_code_is_packaged(arguments: dict[str, Any]) -> None:

@@ -91,10 +91,21 @@ def test_a_function_the_workers_cannot_find(monkeypatch: pytest.MonkeyPatch) -> 
         run(work_tasks.process, [0], Options(processes=1))
 
 
-def test_a_script_without_a_guard_is_told_so(tmp_path: Path) -> None:
-    script = tmp_path / "script.py"
-    script.write_text("import work_tasks\nfrom xb_muscle_ros.work import run\nrun(work_tasks.process, range(2))\n")
-    done = subprocess.run([sys.executable, script], env=child_environment(), capture_output=True, text=True, timeout=60)
+def _script(folder: Path, text: str) -> subprocess.CompletedProcess[str]:
+    script = folder / "script.py"
+    script.write_text(text)
+    return subprocess.run([sys.executable, script], env=child_environment(), capture_output=True, text=True, timeout=60)
+
+
+def test_a_script_needs_no_guard_for_functions_of_modules(tmp_path: Path) -> None:
+    text = "import work_tasks\nfrom xb_muscle_ros.work import run\nprint(len(run(work_tasks.process, range(2))))\n"
+    done = _script(tmp_path, text)
+    assert (done.stdout, done.returncode) == ("2\n", 0)
+
+
+def test_a_script_without_a_guard_for_its_own_function_is_told_so(tmp_path: Path) -> None:
+    text = "from xb_muscle_ros.work import run\ndef own(task):\n    return task\nrun(own, range(2))\n"
+    done = _script(tmp_path, text)
     assert "if __name__ == '__main__'" in done.stderr.splitlines()[-1]
 
 

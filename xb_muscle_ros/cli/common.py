@@ -42,18 +42,11 @@ def fibre_of(arguments: argparse.Namespace, for_fit: bool = False) -> Fibre:
         arguments: parsed.
         for_fit: what it lacks is to be fitted, see `load_fibre`.
     """
-    from xb_muscle_ros.models.catalogue import without_effect_line
-    from xb_muscle_ros.models.fibre_file import borrowed_line, changed, load_fibre
-    from xb_muscle_ros.models.strain_bins import wide_bins_line
+    from xb_muscle_ros.api import inputs
+    from xb_muscle_ros.api.telling import Lines
 
-    fibre = load_fibre(arguments.fiber, arguments.model, arguments.method, for_fit)
-    fibre = changed(fibre, dict(arguments.changes), "--set")
-    # A fit says these of the values that it ends with.
-    of_values = () if for_fit else (without_effect_line(fibre.model, fibre.values), wide_bins_line(fibre.values))
-    for line in (borrowed_line(fibre), *of_values):
-        if line:
-            warn(line)
-    return fibre
+    changes = dict(arguments.changes)
+    return inputs.fibre_of(arguments.fiber, arguments.model, arguments.method, changes, Lines(warn), for_fit)
 
 
 def add_reading(parser: argparse.ArgumentParser, several: bool = False) -> None:
@@ -82,24 +75,9 @@ def known_of(arguments: argparse.Namespace) -> Known:
     Raises:
         UserError: an option is no length or no force.
     """
-    from xb_muscle_ros.errors import UserError
-    from xb_muscle_ros.trials.completing import Known
-    from xb_muscle_ros.trials.readers.units import quantity
+    from xb_muscle_ros.api import inputs
 
-    def value(option: str, text: str | None, kind: str, example: str) -> float | None:
-        if text is None:
-            return None
-        found = quantity(text, kind, "value", option, example)
-        if found.kind != kind:
-            raise UserError(f"{option} is '{text}'; needed is a {kind}, for example '{example}'")
-        return found.value
-
-    first = arguments.reference_length == "first_isometric"
-    return Known(
-        None if first else value("--reference-length", arguments.reference_length, "length", "30 mm"),
-        first,
-        value("--f0", arguments.f0, "force", "0.5 mN"),
-    )
+    return inputs.known_of(arguments.reference_length, arguments.f0)
 
 
 def study_of(arguments: argparse.Namespace, fibre: Fibre) -> Study:
@@ -151,14 +129,9 @@ def work_options_of(arguments: argparse.Namespace, label: str = "", journal: Pat
     Raises:
         UserError: options that are out of range or against each other.
     """
-    from xb_muscle_ros.errors import UserError
-    from xb_muscle_ros.work import Options
+    from xb_muscle_ros.api import inputs
 
-    if arguments.processes is not None and arguments.scheduler is not None:
-        raise UserError("--processes is of this machine and --scheduler of a cluster; drop one of them")
-    if arguments.processes is not None and not 0 <= arguments.processes <= 1024:
-        raise UserError(f"--processes is {arguments.processes}; allowed is 0 to 1024")
-    return Options(arguments.scheduler, arguments.processes, journal, label)
+    return inputs.work_of(arguments.processes, arguments.scheduler, journal, label=label)
 
 
 def warn(message: str) -> None:

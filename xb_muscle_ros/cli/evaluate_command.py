@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_overwrite, add_reading, add_work, known_of, warn, work_options_of
+from xb_muscle_ros.cli.common import add_overwrite, add_reading, add_work, warn
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
@@ -44,58 +44,35 @@ def add(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Evaluate, print the tables, write the files."""
+    from xb_muscle_ros.api.evaluating import evaluate
     from xb_muscle_ros.errors import UserError
-    from xb_muscle_ros.evaluate.report import comparison_table, force_table, readings_with_conditions, srs_table_text
-    from xb_muscle_ros.evaluate.results import Request
-    from xb_muscle_ros.evaluate.run import evaluate
-    from xb_muscle_ros.evaluate.writing import older_results, write
+    from xb_muscle_ros.evaluate.writing import older_results
     from xb_muscle_ros.files import refuse_older
-    from xb_muscle_ros.models.registry import METHODS, split_set
 
     if arguments.paper != (arguments.empirical is not None):
         raise UserError("--paper and --empirical go together; give the table of measured SRS, empirical_srs.json")
-    if arguments.golden is not None and not arguments.paper:
-        raise UserError("--golden is compared with --paper only; add --paper --empirical JSON")
-    if not arguments.bags and not arguments.paper:
-        raise UserError("there is nothing to evaluate; give bags, or --paper --empirical JSON")
-    if arguments.measured_only and (arguments.paper or arguments.model or arguments.fiber):
-        raise UserError("--measured-only has no models; drop it, or --paper, --model and --fiber")
-    if arguments.settle is not None and not 0.0 < arguments.settle <= 1e6:
-        raise UserError(f"--settle is {arguments.settle:g} s; allowed is above 0 to 1e6")
     refuse_older(older_results(arguments.out), arguments.overwrite)
-    for name in arguments.model or ():
-        split_set(name)
-    if arguments.method is not None and arguments.method not in METHODS:
-        raise UserError(f"method '{arguments.method}' is not known; known: {', '.join(METHODS)}")
-    request = Request(
-        bags=tuple(arguments.bags),
-        fibres=tuple(arguments.fiber),
-        models=None if arguments.model is None else tuple(arguments.model),
+    found = evaluate(
+        arguments.bags,
+        fibre=arguments.fiber,
+        model=arguments.model,
         method=arguments.method,
-        settle_s=arguments.settle,
+        reference_length=arguments.reference_length,
+        f0=arguments.f0,
+        trials_of=arguments.trials_of,
+        settle=arguments.settle,
         measured_only=arguments.measured_only,
         skip_bad=arguments.skip_bad,
         empirical=arguments.empirical,
         golden=arguments.golden,
+        processes=arguments.processes,
+        scheduler=arguments.scheduler,
         out=arguments.out,
-        work=work_options_of(arguments),
-        known=known_of(arguments),
-        only=arguments.trials_of,
+        progress=True,
+        tell=warn,
     )
-    results = evaluate(request, warn)
-    for line in results.warnings:
-        warn(line)
-    found = results.sections
-    if found.get("force_rmsd", {}).get("overall"):
-        print(f"force RMSD, fibre means ± s.d.\n\n{force_table(found['force_rmsd'])}\n")
-    if "paper" in found:
-        print(f"beside the paper (= to 0.01 or within its bound, ≠ not)\n\n{comparison_table(found['paper'])}\n")
-    if "srs" in found:
-        shown = readings_with_conditions(found["srs"])
-        for reading in shown:
-            print(f"RMSD of relative SRS, reading '{reading}'\n\n{srs_table_text(found['srs'], reading)}\n")
-        if shown and found["srs"]["aic_note"]:
-            print(found["srs"]["aic_note"] + "\n")
-    for path in write(request, results):
+    if str(found):
+        print(found)
+    for path in found.save(arguments.out, overwrite=True):
         print(path)
     return 0

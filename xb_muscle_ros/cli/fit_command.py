@@ -4,34 +4,20 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from xb_muscle_ros.cli.common import (
     add_fibre,
     add_overwrite,
     add_reading,
     add_work,
-    fibre_of,
-    study_of,
     warn,
-    work_options_of,
 )
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import matching, refuse_older
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from xb_muscle_ros.fit.coordinates import Choice
-    from xb_muscle_ros.fit.data import FitTrial
-    from xb_muscle_ros.fit.problem import Problem
-    from xb_muscle_ros.models.fibre_file import Fibre
-    from xb_muscle_ros.trials.trial import Trial
-
     Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
 
-# What a fit leaves beside the fibre file and its journal.
-_WRITTEN = (r"fit\.json", r"trials(_\d+)?\.(png|pdf)", r"(features|profiles|correlation)\.(png|pdf)")
 _EPILOG = """RULE is KEY=VALUE with KEY one of trial (VALUE may have * and ?), pca, amplitude (L0), recovery (s): a
 trial meets it within what such conditions vary by. Faults of the measurement are pca_shift (per solution), length_gain,
 run_down, time_shift, transducer_lag (per study), force_offset and force_drift (per trial); ordinary are all but
@@ -107,160 +93,48 @@ def add(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, print the tables, write the files."""
-    from xb_muscle_ros.fit.report import as_json, write_fitted, write_json
-    from xb_muscle_ros.fit.run import Settings, fit
-    from xb_muscle_ros.fit.table import table
-    from xb_muscle_ros.trials.bag_files import remove_results
+    from xb_muscle_ros.api.fitting import check_out, fit, number
 
-    out = arguments.out
-    if out.suffix not in (".yaml", ".yml"):
-        raise UserError(f"--out is {out}; needed is the name of a fibre file, ending in .yaml")
-    folder = out.with_suffix("")
-    older = [*([out] if out.exists() else []), *matching(folder, *_WRITTEN)]
-    refuse_older(older, arguments.overwrite)
-    if not 0.5 <= arguments.level < 1.0:
-        raise UserError(f"--level is {arguments.level:g}; allowed is 0.5 up to below 1")
-    fibre = fibre_of(arguments, for_fit=True)
-    trials = _trials(arguments, fibre)
-    problem, notes = _problem(arguments, fibre, trials)
-    for line in notes:
-        warn(line)
-    settings = Settings(arguments.starts, arguments.seed, None if arguments.no_intervals else arguments.level)
-    fitted = fit(problem, settings, work_options_of(arguments, journal=folder / "journal.jsonl"))
-    provenance = {
-        "bags": [str(bag) for bag in arguments.bags],
-        "fibre_of_trials": problem.fibre.name,
-        "features": str(arguments.features) if arguments.features else None,
-        "start": str(arguments.fiber),
-        "split": {"hold_out": arguments.hold_out, "train": arguments.train, "preset": arguments.split},
-        "json": f"{folder.name}/fit.json",
-    }
-    found = as_json(fitted, provenance, notes)
-    print(table(found))
-    for line in found["warnings"]:
-        warn(line)
-    remove_results(matching(folder, *_WRITTEN))
-    write_json(folder / "fit.json", found)
-    for path in _figures(folder, fitted, found):
-        print(path)
-    write_fitted(out, fitted, found)
-    print(folder / "fit.json")
-    print(out)
-    return 0
-
-
-def _figures(folder: Path, fitted: Any, found: dict[str, Any]) -> list[Path]:
-    from xb_muscle_ros.fit.figures.pages import draw
-
-    return draw(folder, fitted, found)
-
-
-def _trials(arguments: argparse.Namespace, fibre: Fibre) -> list[Trial]:
-    if not arguments.bags and arguments.features is None:
-        raise UserError("nothing to fit to; give bags of trials, or --features")
-    if not arguments.bags and arguments.features_of is None:
-        raise UserError("without bags nobody knows whose features to fit; give --features-of")
-    trials = study_of(arguments, fibre).trials if arguments.bags else []
-    fibres = dict.fromkeys(trial.facts.fibre for trial in trials)
-    if len(fibres) > 1:
-        raise UserError(f"trials are of fibres {', '.join(fibres)}; fit one fibre at a time")
-    return trials
-
-
-def _problem(arguments: argparse.Namespace, given: Fibre, trials: list[Trial]) -> tuple[Problem, list[str]]:
-    """The problem, and lines on what was taken for granted."""
-    from xb_muscle_ros.fit.coordinates import fault_coordinates, free_names, parameter_coordinates, population_choices
-    from xb_muscle_ros.fit.data import fit_trials
-    from xb_muscle_ros.fit.features import F0_ANCHOR, Feature, measured
-    from xb_muscle_ros.fit.problem import Problem
-    from xb_muscle_ros.fit.split import held_out
-    from xb_muscle_ros.fit.start import start_lines
-    from xb_muscle_ros.models.fibre_file import load_fibre
-
-    facts = [t.facts for t in trials]
-    ties = dict(_pairs(arguments.tie, "--tie"))
-    fibre, notes = _start(arguments, given, trials, ties)
-    out = held_out(facts, arguments.hold_out, arguments.train, arguments.split)
-    if arguments.split and not any(out):
-        notes.append(f"--split {arguments.split} holds none of the trials out: all of them are fitted")
-    weights = {name: _number(value, f"--weight {name}") for name, value in _pairs(arguments.weight, "--weight")}
-    prepared = fit_trials(trials, out, arguments.window == "whole", weights)
-    training = [t for t in prepared if not t.held_out and t.weight > 0.0]
-    names, sds, lines = _nuisances(arguments.nuisance, training)
-    notes += lines
-    choices = _choices(arguments)
-    if arguments.prior_fibers:
-        others = [load_fibre(name, fibre.model, for_fit=True) for name in arguments.prior_fibers]
-        free = free_names(fibre, arguments.free, arguments.fix, ties)
-        mine, choices = set(choices), population_choices(others, choices, free)
-        default = [name for name in free if name not in choices and name not in mine]
-        if default:
-            notes.append(f"--prior-fibers says nothing of {', '.join(default)}: default priors")
-    coordinates = parameter_coordinates(fibre, arguments.free, arguments.fix, ties, choices)
-    coordinates += fault_coordinates(names, [t.name for t in training], [t.solution for t in training], sds)
-    features: tuple[Feature, ...] = () if arguments.no_anchor else (F0_ANCHOR,)
-    if arguments.features is not None:
-        whose = arguments.features_of or fibre.name
-        features += measured(arguments.features, whose, not arguments.force_pca_only, notes.append)
-    return Problem(fibre, prepared, coordinates, ties, features), [*start_lines(fibre), *notes]
-
-
-def _start(
-    arguments: argparse.Namespace, given: Fibre, trials: list[Trial], ties: dict[str, str]
-) -> tuple[Fibre, list[str]]:
-    """The fibre to start from, with name and constants of the one that was measured, and lines on these."""
-    from dataclasses import replace
-
-    from xb_muscle_ros.fit.start import begun, with_constants
-
-    fibre = begun(given, arguments.free, arguments.fix, ties, dict(arguments.changes))
-    fibre, lines = with_constants(fibre, [t.facts for t in trials])
-    return replace(fibre, name=trials[0].facts.fibre if trials else arguments.features_of), lines
-
-
-def _nuisances(given: list[str] | None, training: Sequence[FitTrial]) -> tuple[list[str], dict[str, float], list[str]]:
-    """Names of faults, standard deviations of those that the user gave one, and lines on what is left out."""
-    from xb_muscle_ros.fit.ordinary import shown_by
-    from xb_muscle_ros.measurement.artefacts import ARTEFACTS
-
-    ordinary, unseen = shown_by(training)
-    sets: dict[str, Sequence[str]] = {"all": tuple(ARTEFACTS), "ordinary": ordinary, "none": ()}
-    names: list[str] = []
-    sds: dict[str, float] = {}
-    for text in ["ordinary"] if given is None else given:
-        name, equals, sd = text.partition("=")
-        if name in sets and equals:
-            raise UserError(
-                f"--nuisance {text}: '{name}' takes no SD, since each has its own unit; name them one by one"
-            )
-        if name == "none" and given is not None and len(given) > 1:
-            raise UserError("--nuisance none is given with others; give it alone")
-        if name in sds:
-            raise UserError(f"--nuisance {name} is given an SD twice; give it once")
-        names += sets.get(name, (name,))
-        if equals:
-            sds[name] = _number(sd, f"--nuisance {name}")
-    left = [name for name in unseen if name not in names]
-    asked = given is None or "ordinary" in given
-    lines = (
-        [f"not fitted, since nothing in the trials shows it: {', '.join(left)}"] if asked and left and training else []
+    folder = check_out(arguments.out, arguments.overwrite)
+    found = fit(
+        arguments.bags,
+        arguments.fiber,
+        model=arguments.model,
+        method=arguments.method,
+        set=dict(arguments.changes),
+        reference_length=arguments.reference_length,
+        f0=arguments.f0,
+        trials_of=arguments.trials_of,
+        hold_out=arguments.hold_out,
+        train=arguments.train,
+        split=arguments.split,
+        window=arguments.window,
+        weight={name: number(value, f"--weight {name}") for name, value in _pairs(arguments.weight, "--weight")},
+        free=arguments.free,
+        fix=arguments.fix,
+        tie=dict(_pairs(arguments.tie, "--tie")),
+        bound={name: _range(value, f"--bound {name}") for name, value in _pairs(arguments.bound, "--bound")},
+        prior={name: _range(value, f"--prior {name}") for name, value in _pairs(arguments.prior, "--prior")},
+        nuisance=arguments.nuisance,
+        prior_fibers=arguments.prior_fibers,
+        features=arguments.features,
+        features_of=arguments.features_of,
+        force_pca_only=arguments.force_pca_only,
+        anchor=not arguments.no_anchor,
+        starts=arguments.starts,
+        seed=arguments.seed,
+        level=arguments.level,
+        intervals=not arguments.no_intervals,
+        processes=arguments.processes,
+        scheduler=arguments.scheduler,
+        journal=folder / "journal.jsonl",
+        progress=True,
+        tell=warn,
     )
-    return names, sds, lines
-
-
-def _choices(arguments: argparse.Namespace) -> dict[str, Choice]:
-    from dataclasses import replace
-
-    from xb_muscle_ros.fit.coordinates import Choice
-
-    made: dict[str, Choice] = {}
-    for name, value in _pairs(arguments.bound, "--bound"):
-        low, high = _range(value, f"--bound {name}")
-        made[name] = replace(made.get(name, Choice()), lower=low, upper=high)
-    for name, value in _pairs(arguments.prior, "--prior"):
-        mean, sd = _range(value, f"--prior {name}")
-        made[name] = replace(made.get(name, Choice()), prior_mean=mean, prior_sd=sd)
-    return made
+    print(found.table)
+    for path in found.save(arguments.out, overwrite=True):
+        print(path)
+    return 0
 
 
 def _pairs(given: list[str], option: str) -> list[tuple[str, str]]:
@@ -274,17 +148,9 @@ def _pairs(given: list[str], option: str) -> list[tuple[str, str]]:
 
 
 def _range(text: str, where: str) -> tuple[float, float]:
+    from xb_muscle_ros.api.fitting import number
+
     low, colon, high = text.partition(":")
     if not colon:
         raise UserError(f"{where}={text}: needed are two numbers with a colon between them")
-    return _number(low, where), _number(high, where)
-
-
-def _number(text: str, where: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise UserError(f"{where}: '{text}' is not a number") from None
-    if value != value:
-        raise UserError(f"{where}: '{text}' is not a number")
-    return value
+    return number(low, where), number(high, where)

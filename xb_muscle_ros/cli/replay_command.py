@@ -34,36 +34,17 @@ def add(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Replay, print the table, write the files."""
-    from xb_muscle_ros.errors import UserError
-    from xb_muscle_ros.replay.run import Player, check_room, replay, write_results
-    from xb_muscle_ros.simulation.offline import one_for_all, pushing
+    from xb_muscle_ros.api.replaying import check_options, replay
+    from xb_muscle_ros.replay.run import check_room
 
-    if not 1 <= arguments.substeps <= 10000:
-        raise UserError(f"--substeps is {arguments.substeps}; allowed is 1 to 10000")
-    if arguments.settle is not None and not 0.0 < arguments.settle <= 1e6:
-        raise UserError(f"--settle is {arguments.settle:g} s; allowed is above 0 to 1e6")
-    if arguments.live and (arguments.substeps != 1 or arguments.settle is not None):
-        raise UserError("--live leaves steps and settling to the node; drop --substeps and --settle")
-    if arguments.live and arguments.changes:
-        raise UserError("--live gives the node a fibre file as it is; put the values of --set into a file of your own")
+    check_options(arguments.substeps, arguments.settle, arguments.live, bool(arguments.changes))
     fibre = fibre_of(arguments)
     trials = study_of(arguments, fibre).trials
-    others = [trial.facts.fibre for trial in trials if trial.facts.fibre != fibre.name]
-    if others:
-        whose = ", ".join(dict.fromkeys(others))
-        warn(f"{len(others)} of {len(trials)} trials are of fibre {whose}, replayed with parameters of {fibre.name}")
     check_room(arguments.out, trials, arguments.overwrite)
-    player: Player | None = None
-    if arguments.live:
-        # The one place where this command touches ROS, and only when asked to.
-        from xb_muscle_ros.node.client.player import play_live
-
-        player = play_live
-    results = replay(trials, fibre, player, arguments.substeps, arguments.settle)
-    told = [pushing(*pair, fibre.model) for pair in zip(trials, results.simulated, strict=True)]
-    for line in one_for_all([line for line in told if line]):
-        warn(line)
-    print(results.table)
-    for path in write_results(arguments.out, trials, results):
+    found = replay(
+        trials, fibre, substeps=arguments.substeps, settle=arguments.settle, live=arguments.live, tell=warn
+    )  # fmt: skip
+    print(found.table)
+    for path in found.save(arguments.out, overwrite=True):
         print(path)
     return 0

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import itertools
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,15 +10,6 @@ from xb_muscle_ros.cli.common import add_fibre, add_overwrite, fibre_of, warn
 
 if TYPE_CHECKING:
     from xb_muscle_ros.cli.common import Subparsers
-
-# Options that are numbers, and what their ranges go by.
-_NUMBERS = {
-    "pca": "pca",
-    "amplitude": "amplitude_l0",
-    "recovery": "recovery_s",
-    "rate": "rate_hz",
-    "settle": "settle_s",
-}
 
 
 def add(subparsers: Subparsers) -> None:
@@ -54,42 +43,24 @@ def add(subparsers: Subparsers) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Simulate and write."""
-    from xb_muscle_ros.errors import naming
+    """Simulate and write, one trial after the other."""
+    from xb_muscle_ros.api import simulating
     from xb_muscle_ros.files import refuse_older
-    from xb_muscle_ros.models.muscle import Muscle
-    from xb_muscle_ros.simulation.offline import as_simulated, pushing
+    from xb_muscle_ros.simulation.offline import pushing
     from xb_muscle_ros.trials.bags import write_trial
-    from xb_muscle_ros.trials.protocol import ALLOWED, StretchShortenStretch
 
-    for option, name in _NUMBERS.items():
-        value = getattr(arguments, option)
-        for number in value if isinstance(value, list) else [] if value is None else [value]:
-            ALLOWED[name].check(f"--{option}", number)
+    pca, amplitude, recovery, rate = arguments.pca, arguments.amplitude, arguments.recovery, arguments.rate
+    simulating.check_numbers(pca=pca, amplitude=amplitude, recovery=recovery, rate=rate, settle=arguments.settle)
     fibre = fibre_of(arguments)
-    planned = []
-    for pca, amplitude, recovery in itertools.product(arguments.pca, arguments.amplitude, arguments.recovery):
-        protocol = StretchShortenStretch(amplitude, recovery)
-        trial = protocol.trial(fibre.name, pca, arguments.rate)
-        planned.append((protocol, trial, arguments.out / f"{arguments.prefix}_{fibre.name}_{trial.facts.trial}"))
-    refuse_older([path for _, _, path in planned if path.exists()], arguments.overwrite)
-    muscle = Muscle(fibre)
-    for protocol, trial, path in planned:
-        calcium = float(trial.calcium_um[0])
-        corner_s, corner_l0 = protocol.corners()
-        with naming(f"trial {trial.facts.trial}"):
-            state = muscle.settle(0.0, calcium, arguments.settle)
-            # Variable steps from corner to corner: the protocol itself, not its samples.
-            states = muscle.follow(state, corner_s, corner_l0, 0.0 * corner_s + calcium, trial.time_s)
-        simulated = as_simulated(trial, trial.time_s, muscle.outputs_of(states))
-        source = f"simulated: fibre {fibre.name}, model {fibre.model}, method {fibre.method}"
-        trial = replace(trial, facts=replace(trial.facts, source=source))
-        if arguments.as_measured:
-            trial = replace(trial, force_time_s=trial.time_s, force_n=simulated.force_n)
+    planned = simulating.protocols(fibre, pca, amplitude, recovery, rate)
+    paths = [simulating.bag_path(arguments.out, arguments.prefix, trial) for _, trial in planned]
+    refuse_older([path for path in paths if path.exists()], arguments.overwrite)
+    made = simulating.simulations(fibre, planned, arguments.settle, arguments.as_measured)
+    for path, (trial, simulated) in zip(paths, made, strict=True):
         write_trial(path, trial, simulated)
-        low, high = simulated.force_n.min(), simulated.force_n.max()
         told = pushing(trial, simulated, fibre.model)
         if told:
             warn(told)
+        low, high = simulated.force_n.min(), simulated.force_n.max()
         print(f"{path}: {trial.time_s.size} samples, force {low:.3f} to {high:.3f} F0")
     return 0

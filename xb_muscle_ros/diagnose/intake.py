@@ -36,7 +36,7 @@ class FibreStudy:
 
 def read_fibres(
     bags: Sequence[str | Path],
-    fibers: Sequence[str | Path],
+    fibers: Sequence[str | Path | Fibre],
     model: str | None = None,
     method: str | None = None,
     known: Known | None = None,
@@ -49,7 +49,7 @@ def read_fibres(
 
     Args:
         bags: bags or folders of bags, in the order of recording.
-        fibers: fibre files, or names of fibres that come with the package.
+        fibers: fibre files, names of fibres that come with the package, or fibres.
         model, method: of the fibre files; their own where None.
         known: what is known of L0 and F0 beside bags and fibre files.
         only: with one fibre: take trials of this fibre and no other.
@@ -65,7 +65,7 @@ def read_fibres(
         raise UserError("there are no bags to diagnose; give at least one")
     if not fibers:
         raise UserError("there is no fibre file to start from; give one with --fiber")
-    fibres = [load_fibre(each, model, method) for each in fibers]
+    fibres = [each if isinstance(each, Fibre) else load_fibre(each, model, method) for each in fibers]
     _check_files(fibres)
     known = known or Known()
     if len(fibres) == 1:
@@ -129,10 +129,42 @@ def _by_name(bags: Sequence[str | Path], fibres: Sequence[Fibre], known: Known) 
     return found
 
 
+def studies_of(trials: Sequence[Trial], fibres: Sequence[Fibre]) -> tuple[FibreStudy, ...]:
+    """A study of trials in memory, complete and checked already.
+
+    Args:
+        trials: in the order of recording; of one fibre file all of them, of several each fibre's own.
+        fibres: where the base models start.
+
+    Raises:
+        UserError: see `read_fibres`.
+    """
+    if not fibres:
+        raise UserError("there is no fibre file to start from; give one with --fiber")
+    _check_files(fibres)
+    named = list(dict.fromkeys(trial.facts.fibre for trial in trials))
+    if len(fibres) == 1:
+        return (_checked(FibreStudy(fibres[0], tuple(trials), tuple(_others_line(named, fibres[0].name)))),)
+    files = [fibre.name for fibre in fibres]
+    if set(named) != set(files):
+        raise UserError(
+            f"trials are of fibres {_listed(named)}, fibre files of {_listed(files)}; give files and trials of the same"
+        )
+    studies = tuple(
+        _checked(FibreStudy(fibre, tuple(t for t in trials if t.facts.fibre == fibre.name), ())) for fibre in fibres
+    )
+    _check_conditions(studies)
+    return studies
+
+
 def _others(bags: Sequence[str | Path], fibre: str) -> list[str]:
     """A line on trials of other fibres, which the one fibre file that was given serves."""
     opened = [TrialBag(path) for path in find_bags(bags)]
-    named = [next(iter(_fibres_of(bag))) for bag in opened if len(bag.fibres) == 1]
+    return _others_line([next(iter(_fibres_of(bag))) for bag in opened if len(bag.fibres) == 1], fibre)
+
+
+def _others_line(named: Sequence[str], fibre: str) -> list[str]:
+    """The line of `_others`, where there is one."""
     others = list(dict.fromkeys(name for name in named if name != fibre))
     if not others:
         return []

@@ -22,6 +22,17 @@ class MuscleBatch:
     Attributes:
         muscles: one for each fibre, in order.
         state_names: see `Muscle`.
+
+    Source:
+        see `Muscle`.
+
+    Example:
+        >>> import numpy as np, xb_muscle_ros as xb
+        >>> batch = xb.MuscleBatch([xb.load_fibre("18Dec2017a"), xb.load_fibre("13Dec2017a")])
+        >>> states = batch.settle(np.zeros(2), np.full(2, 0.8))  # L0 and µM, shape (fibres,)
+        >>> states = batch.step(states, np.array([0.001, 0.0]), np.full(2, 0.8), 1e-3)
+        >>> batch.outputs(states)["force_f0"].shape
+        (2,)
     """
 
     def __init__(self, fibres: Sequence[Fibre]) -> None:

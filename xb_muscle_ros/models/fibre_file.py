@@ -91,8 +91,20 @@ def load_fibre(
         method: representation to use; the file's where None.
         for_fit: see `fibre_from_parameters`.
 
+    Returns:
+        the fibre: values in the units of ``xb_muscle parameters``, L0 in m, F0 in N.
+
     Raises:
         UserError: file missing or malformed, unknown key, model or parameter, value out of range.
+
+    Source:
+        the package's files hold the sets released with van der Zee et al. 2026; each says where it comes from.
+
+    Example:
+        >>> import xb_muscle_ros as xb
+        >>> fibre = xb.load_fibre("18Dec2017a", model="2state")
+        >>> fibre.model, fibre.method
+        ('2state', 'gaussian')
     """
     path = find_fibre_file(name_or_path)
     try:
@@ -113,16 +125,28 @@ def load_fibre(
     return replace(fibre, path=path)
 
 
-def changed(fibre: Fibre, changes: Mapping[str, object], where: str) -> Fibre:
+def changed(fibre: Fibre, changes: Mapping[str, object], where: str = "changes") -> Fibre:
     """The fibre with other values for some of its model's parameters.
 
     Args:
         fibre: stays as it is.
-        changes: by name; each one must be a parameter that the fibre's model and method use.
+        changes: by name, in the units of ``xb_muscle parameters``; each one must be a parameter that the fibre's model
+            and method use.
         where: what the messages call the source of the changes.
+
+    Returns:
+        another fibre.
 
     Raises:
         UserError: a name that model and method do not use, or a value out of range.
+
+    Source:
+        names, units and bounds: the table of parameters, ``xb_muscle parameters``.
+
+    Example:
+        >>> import xb_muscle_ros as xb
+        >>> xb.changed(xb.load_fibre("18Dec2017a"), {"f": 95.0}).values["f"]
+        95.0
     """
     values = dict(fibre.values)
     for name, value in changes.items():

@@ -41,8 +41,24 @@ def fibre_text(
 def write_fibre(path: Path, fibre: Fibre, comments: Sequence[str] = ()) -> None:
     """Write one fibre with the set it has in use; the file appears whole and readable, or not at all.
 
+    Args:
+        path: the file, ending in ``.yaml``.
+        fibre: its values go into the file in their units.
+        comments: lines for the top of the file.
+
     Raises:
         UserError: the folder cannot be written, or the fibre is none that could be read back.
+
+    Source:
+        layout of the file: docs/node.md.
+
+    Example:
+        >>> import pathlib, tempfile, xb_muscle_ros as xb
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     file = pathlib.Path(folder) / "mine.yaml"
+        ...     xb.write_fibre(file, xb.changed(xb.load_fibre("18Dec2017a"), {"f": 95.0}))
+        ...     xb.load_fibre(file).values["f"]
+        95.0
     """
     text = fibre_text(fibre, {fibre.model: fibre.values}, {fibre.model: fibre.source}, comments)
     with replaced(path) as temporary:

@@ -52,6 +52,17 @@ class Muscle:
     Attributes:
         fibre: values and constants.
         parameters: parameter vector in the order of the model's table, read-only.
+
+    Source:
+        equations and their solution: docs/model.md, after van der Zee et al. 2026.
+
+    Example:
+        >>> import xb_muscle_ros as xb
+        >>> muscle = xb.Muscle(xb.load_fibre("18Dec2017a"))
+        >>> state = muscle.settle(0.0, 0.8)  # length change in L0, free calcium in µM
+        >>> state = muscle.step(state, 0.001, 0.8, 1e-3)  # 1 ms later
+        >>> round(muscle.outputs(state).force_f0, 2)  # F0
+        0.55
     """
 
     def __init__(self, fibre: Fibre) -> None:

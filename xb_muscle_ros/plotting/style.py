@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -17,13 +18,32 @@ THIRD = "#117a55"
 SHADE = "#e9edf2"
 
 
+_KEPT: ContextVar[list[Any] | None] = ContextVar("kept", default=None)
+
+
+@contextmanager
+def kept() -> Iterator[list[Any]]:
+    """Figures that are drawn within the block, in order, each labelled with the name of the file that it would be.
+
+    They are handed to whoever asked for them, and not written.
+    """
+    figures: list[Any] = []
+    token = _KEPT.set(figures)
+    try:
+        yield figures
+    finally:
+        _KEPT.reset(token)
+
+
 @contextmanager
 def figure(width_mm: float, height_mm: float) -> Iterator[Any]:
-    """A Matplotlib figure in the common style, closed afterwards."""
-    import matplotlib as mpl
+    """A Matplotlib figure in the common style.
 
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
+    It is none of pyplot's: a notebook keeps its backend, and nothing has to be closed.
+    """
+    import matplotlib as mpl
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
 
     settings: Any = {
         "font.size": 8,
@@ -42,15 +62,21 @@ def figure(width_mm: float, height_mm: float) -> Iterator[Any]:
         "svg.fonttype": "none",
     }
     with mpl.rc_context(settings):
-        made = plt.figure(figsize=(width_mm / 25.4, height_mm / 25.4), layout="constrained")
-        try:
-            yield made
-        finally:
-            plt.close(made)
+        made = Figure(figsize=(width_mm / 25.4, height_mm / 25.4), layout="constrained")
+        FigureCanvasAgg(made)
+        yield made
+        figures = _KEPT.get()
+        if figures is not None:
+            # Ticks take their look from the settings when they are first drawn.
+            made.draw_without_rendering()
+            figures.append(made)
 
 
 def save(made: Any, path: Path) -> None:
     """Save as PNG and, beside it, as PDF."""
+    if _KEPT.get() is not None:
+        made.set_label(path.stem)
+        return
     for suffix in (".png", ".pdf"):
         with replaced(path.with_suffix(suffix)) as temporary:
             made.savefig(temporary)

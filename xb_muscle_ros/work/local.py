@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
 from collections import deque
 from collections.abc import Iterator
@@ -89,7 +90,7 @@ class Pool(Backend):
         resource_tracker.ensure_running()
         ours, theirs = context.Pipe()
         process = context.Process(target=serve, args=(theirs,), daemon=True)
-        with _uninterrupted(), _one_thread_each():
+        with _uninterrupted(), _one_thread_each(), _without_main(self._function.__module__):
             process.start()
             self._workers[ours] = _Worker(process)
         theirs.close()
@@ -191,6 +192,24 @@ def _uninterrupted() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         if arrived:
             signal.raise_signal(signal.SIGINT)
+
+
+@contextlib.contextmanager
+def _without_main(module: str) -> Iterator[None]:
+    """Let processes that start in the block leave the user's script alone, unless the function comes from it.
+
+    Else they would run it anew up to its `if __name__ == "__main__"`, which scripts and notebooks may be without.
+    """
+    main = vars(sys.modules["__main__"])
+    names: tuple[str, ...] = ("__file__", "__spec__")
+    before = {name: main[name] for name in names if name in main}
+    if module != "__main__":
+        main.pop("__file__", None)
+        main["__spec__"] = None
+    try:
+        yield
+    finally:
+        main.update(before)
 
 
 @contextlib.contextmanager

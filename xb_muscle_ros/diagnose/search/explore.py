@@ -52,7 +52,7 @@ class Effort:
     tolerance: float = 0.02
 
 
-QUICK = Effort(steps=5, candidates=4, rivals=2, most=5, tolerance=0.1)
+QUICK: Effort = Effort(steps=5, candidates=4, rivals=2, most=5, tolerance=0.1)
 
 
 def spread(system: System) -> list[dict[str, float]]:

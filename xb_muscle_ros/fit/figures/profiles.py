@@ -55,7 +55,7 @@ def draw_profiles(path: Path, found: Mapping[str, Any]) -> Path:
             handles=list(handles.values()),
             labels=list(handles),
             loc="outside upper center",
-            ncols=min(3, columns + 1),
+            ncols=3 if columns > 2 else 2,
             frameon=False,
         )
         save(made, path)
