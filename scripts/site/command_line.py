@@ -48,14 +48,14 @@ def _is_shown(action: argparse.Action) -> bool:
 def _row(action: argparse.Action) -> tuple[str, str]:
     """Its names with what follows them, and its help."""
     formatter = argparse.HelpFormatter("xb_muscle")
-    value = "" if action.nargs == 0 else formatter._format_args(action, formatter._get_default_metavar_for_optional(action))
+    value = (
+        "" if action.nargs == 0 else formatter._format_args(action, formatter._get_default_metavar_for_optional(action))
+    )
     if action.option_strings:
         shown = ", ".join(f"`{name}`" for name in action.option_strings) + (f" `{value}`" if value else "")
     else:
         shown = f"`{action.metavar or action.dest}`"
     text = (action.help or "") % {"default": action.default, "prog": "xb_muscle"}
-    if action.choices and not all(str(choice) in text for choice in action.choices):
-        text += f" (one of: {', '.join(str(choice) for choice in action.choices)})"
     if action.required and action.option_strings:
         text += " (required)"
     if _is_again(action) and "again" not in text:

@@ -6,7 +6,6 @@ MkDocs calls the functions below; a warning ends `mkdocs build --strict`.
 from __future__ import annotations
 
 import logging
-import os
 import posixpath
 import re
 from collections.abc import Callable
@@ -32,6 +31,9 @@ GENERATED: dict[str, Callable[[], str]] = {
 }
 _PLACE = re.compile(r"^<!-- generated: (.*?) -->$", re.MULTILINE)
 _LINK = re.compile(r"(?<=\]\()(?![a-z]+:|#|/)([^)#\s]+)")
+_BY_FILE = re.compile(r"\[([\w/]+\.md)\]\(([\w/.]+\.md)")
+# A program that a page has its reader write is shown as what it is.
+_WRITTEN = re.compile(r"^```bash\ncat > (\S+\.py) <<'EOF'\n(.*?)^EOF\n```$", re.MULTILINE | re.DOTALL)
 _FENCE = re.compile(r"^( *)(```|~~~).*?^\1\2 *$", re.MULTILINE | re.DOTALL)
 # Code in a text that is the name of a file of this repository, or of a module as seen from the package.
 _NAMED = re.compile(r"(?<!`)`((?:[\w.-]+/)+[\w.-]*|[\w-]+\.py)`(?!`)")
@@ -45,7 +47,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     """README.md becomes the home page, and each notebook a page."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     home = _LINK.sub(lambda link: posixpath.relpath(link[1], "docs"), text)
-    files.append(File.generated(config, "index.md", content=home))
+    files.append(File.generated(config, "index.md", content=f"---\nhide: [navigation]\n---\n{home}"))
     for file in [file for file in files if file.src_uri.endswith(".ipynb")]:
         files.remove(file)
         page = notebooks.as_page(Path(file.abs_src_path))
@@ -69,7 +71,14 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     _check_names(markdown, page.file.src_uri)
     folder = posixpath.dirname(page.file.src_uri)
     linked = _LINK.sub(lambda link: _within(link[1], folder, page.file.src_uri, config, files), markdown)
-    return _PLACE.sub(part, linked)
+    titled = _BY_FILE.sub(lambda link: f"[{_title(link, folder, files)}]({link[2]}", linked)
+    return _PLACE.sub(part, _WRITTEN.sub(r'```python title="\1"\n\2```', titled))
+
+
+def _title(link: re.Match[str], folder: str, files: Files) -> str:
+    """What the menu calls a page that a text calls by its file's name."""
+    file = files.get_file_from_path(posixpath.normpath(posixpath.join(folder, link[2])))
+    return str(file.page.title) if file is not None and file.page is not None and file.page.title else link[1]
 
 
 def _within(link: str, folder: str, page: str, config: MkDocsConfig, files: Files) -> str:
@@ -94,9 +103,9 @@ def _check_names(markdown: str, page: str) -> None:
         name = named[1]
         first = name.partition("/")[0]
         is_module = name.endswith((".py", ".c"))
-        if not (is_module or first in _FOLDERS) or name.endswith(_TO_BE_WRITTEN):
+        if not (is_module or first in _FOLDERS) or first == "out" or name.endswith(_TO_BE_WRITTEN):
             continue
-        if not any(os.path.exists(ROOT / start / name) for start in _SEEN_FROM) and not _anywhere(name):
+        if not any((ROOT / start / name).exists() for start in _SEEN_FROM) and not _anywhere(name):
             LOG.warning("%s: names %s, which is not in this repository", page, name)
 
 

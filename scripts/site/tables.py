@@ -52,7 +52,8 @@ def _rows_of(rows: Mapping[str, Any]) -> str:
 
 def _node_row(name: str, row: Any) -> tuple[str, ...]:
     kind = {bool: "bool", int: "integer", float: "double", str: "string", tuple: "string array"}[type(row.default)]
-    shown = "empty" if row.default in ("", ("",)) else f"`{str(row.default).lower() if kind == 'bool' else row.default}`"
+    default = str(row.default).lower() if kind == "bool" else row.default
+    shown = "empty" if default in ("", ("",)) else f"`{default}`"
     allowed = ", ".join(f"`{choice}`" for choice in row.choices) or span(row.lower, row.upper)
     return f"`{name}`", kind, shown, row.unit, allowed, cell(row.meaning), row.when
 
