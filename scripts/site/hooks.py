@@ -34,6 +34,7 @@ _LINK = re.compile(r"(?<=\]\()(?![a-z]+:|#|/)([^)#\s]+)")
 _BY_FILE = re.compile(r"\[([\w/]+\.md)\]\(([\w/.]+\.md)")
 # A program that a page has its reader write is shown as what it is.
 _WRITTEN = re.compile(r"^```bash\ncat > (\S+\.py) <<'EOF'\n(.*?)^EOF\n```$", re.MULTILINE | re.DOTALL)
+_FETCHED = re.compile(r"<(?:script|img|iframe|source|link)\b[^>]*\s(?:src|href)=\"?((?:https?:)?//[^\"\s>]+)")
 _FENCE = re.compile(r"^( *)(```|~~~).*?^\1\2 *$", re.MULTILINE | re.DOTALL)
 # Code in a text that is the name of a file of this repository, or of a module as seen from the package.
 _NAMED = re.compile(r"(?<!`)`((?:[\w.-]+/)+[\w.-]*|[\w-]+\.py)`(?!`)")
@@ -75,6 +76,13 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     return _PLACE.sub(part, _WRITTEN.sub(r'```python title="\1"\n\2```', titled))
 
 
+def on_post_page(output: str, page: Page, config: MkDocsConfig) -> str:
+    """See that a reader's browser asks no other host for anything."""
+    for found in _FETCHED.finditer(output):
+        LOG.warning("%s: the page loads %s from another host", page.file.src_uri, found[1])
+    return output
+
+
 def _title(link: re.Match[str], folder: str, files: Files) -> str:
     """What the menu calls a page that a text calls by its file's name."""
     file = files.get_file_from_path(posixpath.normpath(posixpath.join(folder, link[2])))
@@ -85,7 +93,7 @@ def _within(link: str, folder: str, page: str, config: MkDocsConfig, files: File
     """A link that stays within the site: a file of the repository outside of docs/ goes along."""
     target = posixpath.normpath(posixpath.join("docs", folder, link))
     if target.startswith("docs/"):
-        return link
+        return re.sub(r"\.ipynb$", ".md", link)
     if target == "README.md":
         return posixpath.relpath("index.md", folder or ".")
     if not (ROOT / target).is_file():
