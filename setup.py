@@ -66,6 +66,7 @@ setup(
         "dask": ["cloudpickle>=2.0", "dask>=2024.1", "distributed>=2024.1"],
         "casadi": ["casadi>=3.6"],
         "pandas": ["pandas>=2.0"],
+        "docs": ["mkdocs-material>=9.5", "mkdocstrings[python]>=1.0", "ruff"],
         "test": [
             "casadi",
             "distributed",

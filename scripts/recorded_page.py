@@ -20,12 +20,12 @@ from xb_muscle_ros.diagnose.result import Diagnosis
 
 INTRO = """# Real recordings
 
-Made by `scripts/diagnose_recordings.py`: trials are imported, some of them are diagnosed, and the others, held out
-until then, are predicted by two fibre files: the fitted base, and the answer's augmented fibre. Of a held-out trial
-nothing is used but its own force before anything moves, and that only for its solution's pCa shift and its force
-offset; errors of a whole set (time shift, length gain) go on to trials that were recorded with the shown ones. RMSD
-is the root mean square of simulated less measured force, in % F0. "Held out" is that of conditions which the
-diagnosis itself left out of its fits (whole solutions where each has two trials or more).
+Made by `scripts/diagnose_recordings.py`. Training trials are diagnosed. Test trials are never shown to the tool
+(figures call them concealed). Two fibre files predict them: the fitted base, and the answer's augmented fibre. Of a
+test trial nothing is used but its own force before anything moves, and that only for its solution's pCa shift and its
+force offset. Errors of a whole set (time shift, length gain) go on to test trials that were recorded with the
+training ones. RMSD is the root mean square of simulated less measured force, in % F0. "Held out" is that of
+conditions which the diagnosis itself left out of its fits (whole solutions where each has two trials or more).
 """
 FORMER = "*This section was made by the former version of the diagnosis (format 1), and has not been run again.*"
 _MARK = "<!-- diagnosis.json, format {} -->"
@@ -78,7 +78,7 @@ def _pools(read: Sequence[tuple[Case, Path, Diagnosis, list[dict[str, Any]]]]) -
 
 def _overview(read: Sequence[tuple[Case, Path, Diagnosis, list[dict[str, Any]]]]) -> str:
     """A line for each study."""
-    heads = ["study", "base", "verdict", "answer", "held out", "held-out trials better", "worse unwarned"]
+    heads = ["study", "base", "verdict", "answer", "held out", "test trials better", "worse unwarned"]
     cells = []
     for case, _, d, rows in read:
         both = [(r["rmsd_f0"]["before"], r["rmsd_f0"].get("after"), r["warned"]) for r in rows]
@@ -123,7 +123,7 @@ def section(case: Case, d: Diagnosis, rows: Sequence[dict[str, Any]], images: st
         "[evaluate.md](evaluate.md)):\n\n" + feature_scores(d)
         if d.feature_scores
         else "",
-        _lines("Warnings, given before any held-out trial was looked at", d.warnings),
+        _lines("Warnings, given before any test trial was looked at", d.warnings),
         _lines("Missing", d.missing),
         _lines("Notes", d.notes),
     ]
@@ -134,9 +134,9 @@ def _heldout(d: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
     if not rows:
         return ""
     if not d.augmented:
-        told = "Held-out trials (no mechanism is in the answer: the base alone predicts them):"
+        told = "Test trials (no mechanism is in the answer: the base alone predicts them):"
     else:
-        told = "Held-out trials (–: no solution at these parameters; pCa shift and offset: what each model asks of the "
+        told = "Test trials (–: no solution at these parameters; pCa shift and offset: what each model asks of the "
         told += "trial's force before anything moves):"
     end = f"Last column: mean force of the last {END_S:g} s, % F0."
     return f"{told}\n\n{heldout(rows)}\n\n{end}"

@@ -46,7 +46,8 @@ def diagnose_bags(
             bag.
         quick: look less hard.
         seed: of the bootstrap.
-        model, method: of the fibre files; their own where None.
+        model: of the fibre files; their own where None.
+        method: of the fibre files; their own where None.
         options: where work is done; finished work is kept in `out`.
         report: write the page as well.
         known: what is known of L0 and F0 beside bags and fibre files.

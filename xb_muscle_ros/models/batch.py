@@ -90,7 +90,8 @@ class MuscleBatch:
         """States after isometric activation from rest, shape (fibres, n).
 
         Args:
-            length_change_l0, calcium_um: shape (fibres,), L0 and µM.
+            length_change_l0: shape (fibres,), L0.
+            calcium_um: shape (fibres,), µM.
 
         Raises:
             UserError, StateViolation: see `Muscle.settle`.

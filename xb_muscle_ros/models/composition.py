@@ -48,7 +48,21 @@ INPUTS = (
 
 
 class Outputs(NamedTuple):
-    """What a fibre shows at one moment; forces in F0, lengths in L0, fractions of all heads or sites."""
+    """What a fibre shows at one moment; van der Zee et al. 2026.
+
+    Attributes:
+        force_f0: force of the fibre, F0.
+        force_ce_f0: of the contractile element, F0.
+        force_pe_f0: of the parallel element, F0.
+        ce_length_change_l0: length change of the contractile element relative to rest, L0.
+        ce_velocity_l0_per_s: its velocity, L0/s; positive lengthens.
+        q0: attached heads, as a share of all; the moment of order 0 of the distribution of strain.
+        q1: moment of order 1, power strokes.
+        q2: moment of order 2, power strokes squared.
+        n_on: available binding sites of the thin filament, as a share of all.
+        drx: heads that are detached and disordered-relaxed, ready to attach, as a share of all.
+        r: forcibly detached heads, as a share of all.
+    """
 
     force_f0: float
     force_ce_f0: float

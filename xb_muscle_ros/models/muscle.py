@@ -240,7 +240,8 @@ class Muscle:
 
         Args:
             state: at the first corner.
-            corner_s, length_change_l0: shape (m,), s and L0; length is linear between corners.
+            corner_s: shape (m,), ascending, s.
+            length_change_l0: shape (m,), L0; linear between corners.
             calcium_um: shape (m,), µM; the k-th acts up to the k-th corner.
             sample_s: shape (n,), ascending, within the corners, s.
             tolerance: error of one step in units of the states (1e-6: about 1e-7 F0).

@@ -54,7 +54,8 @@ def replay(
         trials: at least one, names unique.
         fibre: parameters.
         live: plays the trials through a running node; None replays offline.
-        substeps, settle_s: see `simulate_trial`; offline only.
+        substeps: see `simulate_trial`; offline only.
+        settle_s: see `simulate_trial`; offline only.
 
     Raises:
         UserError: trial names repeat, or the node cannot be used.

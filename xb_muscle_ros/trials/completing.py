@@ -46,7 +46,8 @@ class Known:
         reference_length_m: the user's L0, m; goes before that of a bag.
         first_isometric: the user wants the length before the first stretch for L0.
         f0_n: the user's F0, N; goes before that of a bag.
-        file_reference_length_m, file_f0_n: of the fibre file; taken where a bag has none.
+        file_reference_length_m: L0 of the fibre file, m; taken where a bag has none.
+        file_f0_n: F0 of the fibre file, N; taken where a bag has none.
         file: name of the fibre file; empty without one.
     """
 
