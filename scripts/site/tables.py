@@ -54,7 +54,7 @@ def _node_row(name: str, row: Any) -> tuple[str, ...]:
     kind = {bool: "bool", int: "integer", float: "double", str: "string", tuple: "string array"}[type(row.default)]
     default = str(row.default).lower() if kind == "bool" else row.default
     shown = "empty" if default in ("", ("",)) else f"`{default}`"
-    allowed = ", ".join(f"`{choice}`" for choice in row.choices) or span(row.lower, row.upper)
+    allowed = ", ".join(f"`{choice}`" for choice in row.choices) or span(*row.bounds)
     return f"`{name}`", kind, shown, row.unit, allowed, cell(row.meaning), row.when
 
 
@@ -63,11 +63,10 @@ def models() -> str:
     from xb_muscle_ros.models.registry import BASE_OF, MODELS
     from xb_muscle_ros.models.titles import title_of
 
-    slots = list(dict.fromkeys(slot for row in MODELS.values() for slot in row._fields if slot != "extras"))
+    slots = list(dict.fromkeys(slot for row in MODELS.values() for slot in row.blocks))
     used = [name for name in MODELS if BASE_OF[name] == name or name == "hill"]
     rows = [
-        [f"`{name}`", cell(title_of(name)), *(_block(getattr(MODELS[name], slot, None)) for slot in slots)]
-        for name in used
+        [f"`{name}`", cell(title_of(name)), *(_block(MODELS[name].blocks.get(slot)) for slot in slots)] for name in used
     ]
     return table(["model", "in the paper", *(slot.replace("_", " ") for slot in slots)], rows)
 
@@ -91,10 +90,9 @@ def mechanisms() -> str:
         (f"`{name}`", _first(extra), cell(extra.needs.value), ", ".join(f"`{p.name}`" for p in extra.parameters))
         for name, extra in EXTRAS.items()
     ]
-    for name, blocks in SWAPS.items():
-        for slot, block in blocks.items():
-            what = f"in place of the model's {slot.replace('_', ' ')}: {_first(block)}"
-            rows.append((f"`{name}`", what, "", ", ".join(f"`{p.name}`" for p in block.parameters)))
+    for name, block in SWAPS.items():
+        what = f"in place of the model's {block.family.value.replace('_', ' ')}: {_first(block)}"
+        rows.append((f"`{name}`", what, "", ", ".join(f"`{p.name}`" for p in block.parameters)))
     return table(("mechanism", "what it is", "needs", "parameters"), rows)
 
 
