@@ -10,7 +10,6 @@ to --images, the page to --page; sections of cases that are not in <out> stay as
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Sequence
@@ -33,7 +32,7 @@ from xb_muscle_ros.diagnose.report import output
 from xb_muscle_ros.diagnose.result import Diagnosis
 from xb_muscle_ros.diagnose.run import diagnose
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import replaced, write_text
+from xb_muscle_ros.files import replaced, write_json, write_text
 from xb_muscle_ros.fit.coordinates import parameter_coordinates
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.problem import Problem
@@ -128,7 +127,7 @@ def run_case(
         row["warned"] = warned_beforehand(d, row["fibre"])
     with replaced(folder / "predictions.npz") as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)
-    write_text(folder / "predictions.json", json.dumps({"case": case.key, "concealed": rows}, indent=1) + "\n")
+    write_json(folder / "predictions.json", {"case": case.key, "concealed": rows})
 
 
 def _file(kind: str, fibre: str, d: Diagnosis) -> str:

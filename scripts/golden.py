@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from xb_muscle_ros.bench.golden import QUANTITIES, STEPPERS, Cell, compare
 from xb_muscle_ros.evaluate.golden import SETS
+from xb_muscle_ros.tables import write_csv
 
 # Table -> largest median and largest single error that are accepted.
 BARS = {
@@ -56,12 +56,9 @@ def main(golden: Path, tables: list[str], every: tuple[int, int, int, int], out:
             print(f"  {len(here)} of {len(cells)} cells of {table}; reason: {reason}")
         beyond += sum(c.error > limit for c in here)
     if out is not None:
-        with out.open("w", newline="", encoding="utf-8") as file:
-            table_of = csv.writer(file, lineterminator="\n")
-            table_of.writerow([*Cell._fields, "error", "reason"])
-            for c, reason in listed:
-                numbers = [f"{x:.6g}" if isinstance(x, float) else x for x in c]
-                table_of.writerow([*numbers, f"{c.error:.4f}", reason])
+        told = ([f"{x:.6g}" if isinstance(x, float) else x for x in c] for c, _ in listed)
+        rows = ([*row, f"{c.error:.4f}", reason] for row, (c, reason) in zip(told, listed, strict=True))
+        write_csv(out, [*Cell._fields, "error", "reason"], rows)
     return 1 if beyond else 0
 
 

@@ -11,11 +11,12 @@ from typing import Any
 
 from recorded_cases import Case
 from recorded_predictions import END_S
-from recorded_tables import components, concealed, feature_scores, fibres, force, places, probability, sets, table
+from recorded_tables import components, concealed, feature_scores, fibres, force, places, probability, sets
 
 from xb_muscle_ros.diagnose.component import Kind
 from xb_muscle_ros.diagnose.report import output, prose
 from xb_muscle_ros.diagnose.result import Diagnosis
+from xb_muscle_ros.tables import markdown
 
 INTRO = """# Real recordings
 
@@ -91,7 +92,7 @@ def _overview(read: Sequence[tuple[Case, Path, Diagnosis, list[dict[str, Any]]]]
             ]
         )  # fmt: skip
     told = '"Worse unwarned": trials that the answer predicts worse than the base by more than 2 % F0, or not at all, '
-    return f"## Overview\n\n{table(heads, cells)}\n\n{told}without a warning given beforehand.\n"
+    return f"## Overview\n\n{markdown(heads, cells)}\n\n{told}without a warning given beforehand.\n"
 
 
 def _answer(d: Diagnosis) -> str:
@@ -165,5 +166,5 @@ def _singly(key: str, found: Sequence[tuple[Case, Diagnosis]]) -> str:
     told = "; ".join(f"{name} in {k} of {len(found)}" for name, k in count.items()) or "no mechanism in any fibre"
     return (
         f"## Each fibre by itself, base `{model}`\n\n{_MARK.format(found[0][1].format_version)}\n\n"
-        f"{table(heads, cells)}\n\nNamed with probability 0.5 and more: {told}. Key of the pooled study: `{key}`.\n"
+        f"{markdown(heads, cells)}\n\nNamed with probability 0.5 and more: {told}. Key of the pooled study: `{key}`.\n"
     )

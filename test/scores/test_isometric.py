@@ -55,7 +55,7 @@ def test_all_commands_take_the_same_force() -> None:
     expected = isometric_force(trial, TIME, trial.measured_f0).value
     assert expected is not None
     simulated = Simulated(TIME, trial.force_n, TIME, TIME, dict.fromkeys(MOMENTS, TIME))
-    assert record(trial, simulated, load_fibre("18Dec2017a"))["measured_isometric_force_f0"] == expected
+    assert record(trial, simulated, load_fibre("18Dec2017a")).measured["isometric_f0"].value == expected
     assert answer(trial, TIME, trial.measured_f0)["isometric_f0"] == expected
     (fitted,) = fit_trials([trial], [False], whole=True)
     assert float(np.mean(fitted.measured_f0[fitted.steady])) == expected

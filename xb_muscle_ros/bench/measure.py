@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from xb_muscle_ros.files import write_text
+from xb_muscle_ros.files import write_json
+from xb_muscle_ros.tables import Columns, aligned, filled, number
 
 
 @dataclass(frozen=True)
@@ -46,17 +46,19 @@ def timed(work: Callable[[], object], repeats: int, per: float = 1.0) -> tuple[f
 
 def as_text(figures: Sequence[Figure]) -> str:
     """Figures as a table."""
-    lines = []
-    for f in figures:
-        spread = "" if f.spread is None else f" ± {f.spread:.3g}"
-        lines.append(f"{f.name:58s} {f.value:>10.4g}{spread:<12s} {f.unit:6s} {f.compared_with}")
-    return "\n".join(lines)
+    columns: Columns[Figure] = {
+        "measured": lambda f: f.name,
+        "median": lambda f: number(f.value, ".4g"),
+        "± quartile": lambda f: "" if f.spread is None else f"± {f.spread:.3g}",
+        "unit": lambda f: f.unit,
+        "compared with": lambda f: f.compared_with,
+    }
+    return aligned(*filled(columns, figures), left=(0, 2, 3, 4))
 
 
 def write(path: Path, figures: Sequence[Figure], machine: dict[str, object]) -> None:
     """Write figures to ``bench.json``."""
-    tree = {"machine": machine, "figures": [asdict(figure) for figure in figures]}
-    write_text(path, json.dumps(tree, indent=1) + "\n")
+    write_json(path, {"machine": machine, "figures": figures})
 
 
 def machine() -> dict[str, object]:

@@ -17,7 +17,7 @@ from xb_muscle_ros.cli.common import (
     work_options_of,
 )
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import matching, refuse_older
+from xb_muscle_ros.files import matching, refuse_older, write_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -107,7 +107,7 @@ def add(subparsers: Subparsers) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, print the tables, write the files."""
-    from xb_muscle_ros.fit.report import as_json, write_fitted, write_json
+    from xb_muscle_ros.fit.report import as_json, write_fitted
     from xb_muscle_ros.fit.run import Settings, fit
     from xb_muscle_ros.fit.table import table
     from xb_muscle_ros.trials.bag_files import remove_results

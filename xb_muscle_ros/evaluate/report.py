@@ -7,9 +7,9 @@ from typing import Any
 
 from xb_muscle_ros.evaluate.paper import NEED_RECORDINGS
 from xb_muscle_ros.evaluate.sections import left_out_lines
-from xb_muscle_ros.evaluate.tables_text import NOTHING, markdown, number, plus_minus, with_error
 from xb_muscle_ros.evaluate.trials import WINDOWS
 from xb_muscle_ros.scores.conditions import SETS
+from xb_muscle_ros.tables import NOTHING, markdown, number, with_error
 
 _READING_TEXT = {
     "text": "as the paper's text defines it: SRS relative to the reference trial, large reductions at low and "
@@ -254,7 +254,9 @@ def _enhancement(sections: Mapping[str, Any]) -> str:
 
 
 def _percent(held: Mapping[str, Any] | None) -> str:
-    return NOTHING if not held else plus_minus(100.0 * held["mean"], _times(held["sd"], 100.0))
+    if not held:
+        return NOTHING
+    return number(held["mean"], ".2f", 100.0) + ("" if held["sd"] is None else f" ± {100.0 * held['sd']:.2f}")
 
 
 def _times(value: float | None, factor: float) -> float | None:

@@ -21,8 +21,9 @@ from xb_muscle_ros.evaluate.srs_scores import (
 from xb_muscle_ros.evaluate.srs_table import SrsTable
 from xb_muscle_ros.evaluate.trials import MEASURED, WINDOWS, Trials
 from xb_muscle_ros.scores.activation import CLASSES
-from xb_muscle_ros.scores.estimate import Estimate, notes_of, quotient, unsound
+from xb_muscle_ros.scores.estimate import Estimate, notes_of, quotient
 from xb_muscle_ros.scores.readout import TEXT
+from xb_muscle_ros.tables import unsound
 from xb_muscle_ros.trials.trial import Array
 
 TRIAL_COLUMNS = (

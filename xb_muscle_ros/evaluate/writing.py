@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,9 +9,9 @@ from typing import Any
 from xb_muscle_ros.evaluate import sections
 from xb_muscle_ros.evaluate.report import write_up
 from xb_muscle_ros.evaluate.results import Request, Results
-from xb_muscle_ros.evaluate.tables_text import write_csv
 from xb_muscle_ros.evaluate.trials import MEASURED
-from xb_muscle_ros.files import matching, write_text
+from xb_muscle_ros.files import matching, write_json, write_text
+from xb_muscle_ros.tables import write_csv
 from xb_muscle_ros.trials.bag_files import remove_results
 
 
@@ -32,12 +31,12 @@ def write(request: Request, results: Results) -> list[Path]:
 def write_tables(out: Path, results: Results) -> list[Path]:
     """Write ``evaluate.json``, ``evaluate.md`` and the CSV files."""
     found = results.sections
-    write_text(out / "evaluate.json", json.dumps(found, indent=1, allow_nan=False) + "\n")
+    write_json(out / "evaluate.json", found)
     write_text(out / "evaluate.md", write_up(found))
     made = ["evaluate.json", "evaluate.md"]
 
     def table(name: str, rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> None:
-        write_csv(out / name, rows, columns)
+        write_csv(out / name, columns, ([row[column] for column in columns] for row in rows))
         made.append(name)
 
     if results.trials is not None:
