@@ -56,10 +56,12 @@ def main(golden: Path, tables: list[str], every: tuple[int, int, int, int], out:
             print(f"  {len(here)} of {len(cells)} cells of {table}; reason: {reason}")
         beyond += sum(c.error > limit for c in here)
     if out is not None:
-        told = ([f"{x:.6g}" if isinstance(x, float) else x for x in c] for c, _ in listed)
-        rows = ([*row, f"{c.error:.4f}", reason] for row, (c, reason) in zip(told, listed, strict=True))
-        write_csv(out, [*Cell._fields, "error", "reason"], rows)
+        write_csv(out, ({**_row(c), "error": f"{c.error:.4f}", "reason": reason} for c, reason in listed))
     return 1 if beyond else 0
+
+
+def _row(cell: Cell) -> dict[str, object]:
+    return {name: f"{x:.6g}" if isinstance(x, float) else x for name, x in cell._asdict().items()}
 
 
 if __name__ == "__main__":

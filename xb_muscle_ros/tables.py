@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -80,12 +81,22 @@ def _padded(cells: Sequence[str], widths: Sequence[int], left: Collection[int]) 
     return [cell.ljust(width) if i in left else cell.rjust(width) for i, (cell, width) in sized]
 
 
-def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Write rows one by one; None and NaN become empty, floats stay exact. The file appears whole or not at all."""
+def write_csv(path: Path, rows: Iterable[Mapping[str, Any]], columns: Sequence[str] = ()) -> None:
+    """Write rows one by one; None and NaN become empty, floats stay exact. The file appears whole or not at all.
+
+    Args:
+        path: of the file.
+        rows: column -> value, the same columns in each.
+        columns: for a table that may be without rows; else those of the first row.
+    """
+    rest = iter(rows)
+    first = next(rest, None)
     with replaced(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(head)
-        writer.writerows([None if _not_finite(cell) else cell for cell in row] for row in rows)
+        # csv writes floats as repr does, and None as nothing.
+        writer = csv.DictWriter(file, list(first or columns), lineterminator="\n")
+        writer.writeheader()
+        for row in itertools.chain([first] if first else [], rest):
+            writer.writerow({name: None if _not_finite(cell) else cell for name, cell in row.items()})
 
 
 def _not_finite(cell: Any) -> bool:

@@ -116,18 +116,18 @@ def test_agreement_with_values_ranges_and_bounds(lower: float, upper: float, agr
     models = gather(["18Dec2017a"], ["3state_coop"], None)
     reported = Reported("srs_rmsd.large", "3state_coop", lower, upper, "made up")
     (entry,) = compare([source], DATA, models, [reported])
-    assert entry["agrees"]["ours"]["text"] is agrees
-    assert ("not reproduced" in entry["remark"]) is not agrees
+    assert entry.agrees["ours"]["text"] is agrees
+    assert ("not reproduced" in entry.remark) is not agrees
 
 
 def test_what_cannot_be_had_is_said() -> None:
     models = gather(["18Dec2017a"], ["hill", "3state_coop"], None)
     source = Source("ours", {"hill": table(1.0), "3state_coop": table(0.8)}, {})
-    by = {(e["quantity"], e["model"]): e for e in compare([source], DATA, models)}
-    assert "set borrowed from hill_se" in by["srs_rmsd.large", "hill"]["remark"]
-    assert by["srs_rmsd.small", "2state_coop"]["remark"] == "no parameter set released for this model"
-    assert by["srs_rmsd.small", "2state_coop"]["agrees"] == {"ours": {"text": None, "released": None}}
-    assert "does not redevelop" in by["k_tr", "3state_coop"]["remark"]
+    by = {(e.quantity, e.model): e for e in compare([source], DATA, models)}
+    assert "set borrowed from hill_se" in by["srs_rmsd.large", "hill"].remark
+    assert by["srs_rmsd.small", "2state_coop"].remark == "no parameter set released for this model"
+    assert by["srs_rmsd.small", "2state_coop"].agrees == {"ours": {"text": None, "released": None}}
+    assert "does not redevelop" in by["k_tr", "3state_coop"].remark
 
 
 def test_the_papers_numbers_are_written_as_it_has_them() -> None:
@@ -142,4 +142,4 @@ def test_all_readings_are_listed() -> None:
     models = gather(["18Dec2017a"], ["3state_coop"], None)
     found = readings_table([Source("ours", {"3state_coop": table(1.0)}, {})], DATA, models, ALL_READINGS)
     assert len(found) == len(ALL_READINGS) == 32
-    assert found[0]["rmsd_large"] == pytest.approx(0.2)
+    assert found[0].scores.rmsd["large"] == pytest.approx(0.2)

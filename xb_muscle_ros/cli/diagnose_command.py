@@ -4,58 +4,48 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_overwrite, add_reading, add_work, known_of, work_options_of
+from xb_muscle_ros.cli.common import (
+    add_bags,
+    add_fibre,
+    add_model,
+    add_out,
+    add_reading,
+    add_work,
+    known_of,
+    work_options_of,
+)
 
-if TYPE_CHECKING:
-    Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
+DESCRIPTION = (
+    "Locate where recordings and simulation differ, name what physics is missing, model it, and show how well the "
+    "augmented model does."
+)
 
 
-def add(subparsers: Subparsers) -> None:
-    """Add the command to the command line."""
-    parser = subparsers.add_parser(
-        "diagnose",
-        help="say what physics a simulation left out of recordings",
-        description="Locate where recordings and simulation differ, name what is missing, model it and show how well.",
-    )
-    parser.add_argument("bags", nargs="+", type=Path, metavar="BAG", help="bags or folders, in the order of recording")
-    parser.add_argument(
-        "--fiber",
-        "--fibre",
-        dest="fiber",
-        required=True,
-        action="extend",
-        nargs="+",
-        metavar="FIBER",
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    add_bags(parser)
+    add_fibre(
+        parser, several=True, required=True,
         help="fibre files, or names of fibres in the package; with several, bags are found by the fibre's name",
-    )
-    parser.add_argument("--model", help="parameter set of the fibre file (default: the one the file names)")
-    parser.add_argument("--method", help="how heads are distributed over strain (default: the fibre file's)")
+    )  # fmt: skip
+    add_model(parser, changes=False)
     add_reading(parser)
     parser.add_argument(
         "--features", type=Path, metavar="JSON", help="measured SRS and isometric force to be met beside the traces"
     )
     parser.add_argument(
-        "--predict",
-        type=Path,
-        metavar="JSON",
+        "--predict", type=Path, metavar="JSON",
         help="measured SRS and isometric force: predicted and compared, never fitted",
-    )
+    )  # fmt: skip
     parser.add_argument(
-        "--nuisance",
-        action="extend",
-        nargs="+",
-        default=[],
-        metavar="FAULT=SD",
-        help="SDs of ordinary measurement errors where the study knows better, such as time_shift=0.002 (s)",
-    )
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for report and results")
-    parser.add_argument("--quick", action="store_true", help="look less hard: minutes become tens of seconds")
-    parser.add_argument("--seed", type=_seed, default=1, help="of the bootstrap (default 1)")
-    add_overwrite(parser)
+        "--nuisance", action="extend", nargs="+", default=[], metavar="ARTEFACT=SD",
+        help="SDs of measurement artefacts where the study knows better, in their units, such as time_shift=0.002 (s)",
+    )  # fmt: skip
+    add_out(parser, "folder for report and results")
+    parser.add_argument("--quick", action="store_true", help="search less thoroughly: minutes become tens of seconds")
+    parser.add_argument("--seed", type=_seed, default=1, metavar="N", help="seed of the bootstrap (default 1)")
     add_work(parser)
-    parser.set_defaults(run=run)
 
 
 def _seed(text: str) -> int:

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_fibre, fibre_of
+from xb_muscle_ros.cli.common import add_fibre, add_model, fibre_of
 
-if TYPE_CHECKING:
-    from xb_muscle_ros.cli.common import Subparsers
+DESCRIPTION = "List the parameter table; with --fiber the parameters of the fibre's model and their values."
 
 
-def add(subparsers: Subparsers) -> None:
-    """Add the command to the command line."""
-    parser = subparsers.add_parser(
-        "parameters", help="list parameters with unit, range and meaning", description="List the parameter table."
-    )
-    add_fibre(parser, required=False)
-    parser.set_defaults(run=run)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    add_fibre(parser)
+    add_model(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -3,45 +3,51 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
-from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_fibre, add_overwrite, add_reading, fibre_of, study_of, warn
+from xb_muscle_ros.cli.common import (
+    add_bags,
+    add_fibre,
+    add_model,
+    add_out,
+    add_reading,
+    add_settle,
+    check_settle,
+    fibre_of,
+    study_of,
+    warn,
+)
+from xb_muscle_ros.errors import UserError
 
-if TYPE_CHECKING:
-    from xb_muscle_ros.cli.common import Subparsers
+DESCRIPTION = (
+    "Replay bags through the model, compare simulated with measured force, and write replay.json, a figure and the "
+    "simulated bags."
+)
 
 
-def add(subparsers: Subparsers) -> None:
-    """Add the command to the command line."""
-    parser = subparsers.add_parser(
-        "replay",
-        help="replay bags through the model and compare forces",
-        description="Replay bags through the model; writes replay.json, a figure and the simulated bags.",
-    )
-    parser.add_argument("bags", nargs="+", metavar="BAG", help="bag folder, .mcap file, or folder of bags")
-    add_fibre(parser)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    add_bags(parser)
+    add_fibre(parser, required=True)
+    add_model(parser)
     add_reading(parser)
-    parser.add_argument("--out", type=Path, required=True, help="folder for replay.json, figures and simulated bags")
+    add_out(parser, "folder for replay.json, figures and simulated bags")
     parser.add_argument(
         "--live", action="store_true", help="play the bags through a running muscle_node (mode lockstep)"
     )
-    parser.add_argument("--substeps", type=int, default=1, help="steps between two samples (default 1, as the node)")
-    parser.add_argument("--settle", type=float, help="isometric time before each trial, s (default: until at rest)")
-    add_overwrite(parser)
-    parser.set_defaults(run=run)
+    parser.add_argument(
+        "--substeps", type=int, default=1, metavar="N", help="steps between two samples (default 1, as the node)"
+    )
+    add_settle(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Replay, print the table, write the files."""
-    from xb_muscle_ros.errors import UserError
     from xb_muscle_ros.replay.run import Player, check_room, replay, write_results
     from xb_muscle_ros.simulation.offline import one_for_all, pushing
 
     if not 1 <= arguments.substeps <= 10000:
         raise UserError(f"--substeps is {arguments.substeps}; allowed is 1 to 10000")
-    if arguments.settle is not None and not 0.0 < arguments.settle <= 1e6:
-        raise UserError(f"--settle is {arguments.settle:g} s; allowed is above 0 to 1e6")
+    check_settle(arguments)
     if arguments.live and (arguments.substeps != 1 or arguments.settle is not None):
         raise UserError("--live leaves steps and settling to the node; drop --substeps and --settle")
     if arguments.live and arguments.changes:

@@ -5,13 +5,8 @@ from __future__ import annotations
 import argparse
 import itertools
 from dataclasses import replace
-from pathlib import Path
-from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_fibre, add_overwrite, fibre_of, warn
-
-if TYPE_CHECKING:
-    from xb_muscle_ros.cli.common import Subparsers
+from xb_muscle_ros.cli.common import add_fibre, add_model, add_out, add_settle, fibre_of, warn
 
 # Options that are numbers, and what their ranges go by.
 _NUMBERS = {
@@ -21,36 +16,33 @@ _NUMBERS = {
     "rate": "rate_hz",
     "settle": "settle_s",
 }
+DESCRIPTION = (
+    "Simulate every combination of the given pCa, amplitudes and recovery times of the stretch-shorten-stretch "
+    "protocol; one bag for each."
+)
 
 
-def add(subparsers: Subparsers) -> None:
-    """Add the command to the command line."""
-    parser = subparsers.add_parser(
-        "simulate",
-        help="simulate stretch-shorten-stretch trials into bags",
-        description="Simulate every combination of the given pCa, amplitudes and recovery times; one bag for each.",
-    )
-    add_fibre(parser)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    add_fibre(parser, required=True)
+    add_model(parser)
     parser.add_argument("--pca", type=float, nargs="+", default=[6.1], help="pCa of the bathing solution (default 6.1)")
     parser.add_argument(
-        "--amplitude",
-        type=float,
-        nargs="+",
-        default=[0.0383],
+        "--amplitude", type=float, nargs="+", default=[0.0383], metavar="L0",
         help="conditioning stretch, L0 (default 0.0383; 0: none)",
-    )
-    parser.add_argument("--recovery", type=float, nargs="+", default=[0.001], help="recovery, s (default 0.001)")
-    parser.add_argument("--rate", type=float, default=1000.0, help="samples per second (default 1000)")
-    parser.add_argument("--settle", type=float, help="isometric time before the trial, s (default: until at rest)")
+    )  # fmt: skip
     parser.add_argument(
-        "--as-measured",
-        action="store_true",
+        "--recovery", type=float, nargs="+", default=[0.001], metavar="S",
+        help="time between shortening and test stretch, s (default 0.001)",
+    )  # fmt: skip
+    parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="samples per second (default 1000)")
+    add_settle(parser)
+    parser.add_argument(
+        "--as-measured", action="store_true",
         help="also write the force as measured force, to replay the bag like a recording",
-    )
-    parser.add_argument("--prefix", default="simulated", help="begins the names of the bags (default 'simulated')")
-    parser.add_argument("--out", type=Path, default=Path("bags"), help="folder for the bags (default 'bags')")
-    add_overwrite(parser)
-    parser.set_defaults(run=run)
+    )  # fmt: skip
+    parser.add_argument("--prefix", default="simulated", help="begins the names of the bags (default simulated)")
+    add_out(parser, "folder for the bags", "bags")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -58,6 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.errors import naming
     from xb_muscle_ros.files import refuse_older
     from xb_muscle_ros.models.muscle import Muscle
+    from xb_muscle_ros.progress import Progress
     from xb_muscle_ros.simulation.offline import as_simulated, pushing
     from xb_muscle_ros.trials.bags import write_trial
     from xb_muscle_ros.trials.protocol import ALLOWED, StretchShortenStretch
@@ -74,6 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
         planned.append((protocol, trial, arguments.out / f"{arguments.prefix}_{fibre.name}_{trial.facts.trial}"))
     refuse_older([path for _, _, path in planned if path.exists()], arguments.overwrite)
     muscle = Muscle(fibre)
+    progress = Progress(len(planned), "simulate")
     for protocol, trial, path in planned:
         calcium = float(trial.calcium_um[0])
         corner_s, corner_l0 = protocol.corners()
@@ -88,8 +82,9 @@ def run(arguments: argparse.Namespace) -> int:
             trial = replace(trial, force_time_s=trial.time_s, force_n=simulated.force_n)
         write_trial(path, trial, simulated)
         low, high = simulated.force_n.min(), simulated.force_n.max()
-        told = pushing(trial, simulated, fibre.model)
-        if told:
+        if told := pushing(trial, simulated, fibre.model):
             warn(told)
-        print(f"{path}: {trial.time_s.size} samples, force {low:.3f} to {high:.3f} F0")
+        progress.write(f"{path}: {trial.time_s.size} samples, force {low:.3f} to {high:.3f} F0")
+        progress.update()
+    progress.close()
     return 0

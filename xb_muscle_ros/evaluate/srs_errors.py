@@ -25,8 +25,8 @@ def pooled_error(table: SrsTable, fibre: str, kind: str, pooled: ByClass) -> Arr
     out = np.full(pooled.test.shape, np.nan)
     if held.test_se is None:
         return out
-    below = table.unconditioned_se(fibre, kind)
-    used = np.isfinite(held.test) & np.isfinite(table.unconditioned(fibre, kind))[:, None, None]
+    unconditioned, below = table.unconditioned(fibre, kind)
+    used = np.isfinite(held.test) & np.isfinite(unconditioned)[:, None, None]
     used &= table.sound(fibre, kind)
     classes = table.classes(fibre)
     for level in range(len(CLASSES)):

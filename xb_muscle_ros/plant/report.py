@@ -135,14 +135,15 @@ def write(out: Path, traces: Sequence[Trace], settings: dict[str, object]) -> li
     ]
     tree = {"scene": traces[0].scene, **settings, "load_nm_per_rad": traces[0].load_nm_per_rad, "runs": runs}
     write_json(out / "loop.json", tree)
-    muscles = traces[0].muscles
-    columns = [f"{m}.{what}" for what in ("force_n", "length_change_l0") for m in muscles]
-    write_csv(out / "loop.csv", ["model", "time_s", "angle_rad", "torque_nm", *columns], _samples(traces))
+    write_csv(out / "loop.csv", _samples(traces))
     return [out / "loop.json", out / "loop.csv"]
 
 
-def _samples(traces: Sequence[Trace]) -> Iterator[list[Any]]:
+def _samples(traces: Sequence[Trace]) -> Iterator[dict[str, Any]]:
     """Long format: a row for each run and tick."""
+    columns = [f"{m}.{what}" for what in ("force_n", "length_change_l0") for m in traces[0].muscles]
+    names = ["model", "time_s", "angle_rad", "torque_nm", *columns]
     for trace in traces:
         data = (trace.time_s, trace.angle_rad, trace.torque_nm, trace.force_n, trace.length_change_l0)
-        yield from ([trace.label, *row] for row in np.column_stack(data).tolist())
+        for row in np.column_stack(data).tolist():
+            yield dict(zip(names, [trace.label, *row], strict=True))

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from xb_muscle_ros.scores.estimate import Estimate, quotient
-from xb_muscle_ros.scores.isometric import isometric_force
 from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN, ForceNoise, force_noise
+from xb_muscle_ros.scores.steady import steady_part
 from xb_muscle_ros.scores.stiffness import stiffness_of_phase
 from xb_muscle_ros.trials.trial import Array, Trial
 
@@ -21,6 +21,19 @@ TEXT = {
     SRS_TEST: "SRS of the test stretch",
     ISOMETRIC: "isometric force",
 }
+
+
+def isometric_force(trial: Trial, time_s: Array, force_f0: Array, noise: ForceNoise | None = None) -> Estimate:
+    """Mean force (F0) over the steady isometric part that a trial begins with: the one definition of all commands.
+
+    Args:
+        trial, time_s, force_f0: see `steady_part`.
+        noise: of the force; None for simulated force.
+    """
+    inside, why = steady_part(trial, time_s, force_f0)
+    if why:
+        return Estimate(None, why=why)
+    return Estimate(float(np.mean(force_f0[inside])), None if noise is None else noise.of_mean(time_s[inside]))
 
 
 def read_off(trial: Trial, time_s: Array, force_f0: Array, noise: ForceNoise | None = None) -> dict[str, Estimate]:

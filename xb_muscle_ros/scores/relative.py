@@ -6,8 +6,9 @@ history leaves stiffness as it was, 0 where nothing is left of it.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -94,37 +95,43 @@ def over_fibres(fibres: Sequence[ByClass], averaging: str = "mean") -> Averaged:
     return Averaged(centre, nansd(each), n)
 
 
-def rmsd(a: Array, b: Array, where: npt.NDArray[np.bool_]) -> tuple[float, float, int]:
-    """Root-mean-square difference, residual sum of squares and count over the conditions of a mask known to both."""
+class Rmsd(NamedTuple):
+    """Root-mean-square difference (None where nothing is known to both), residual sum of squares, and how many."""
+
+    value: float | None
+    rss: float
+    n: int
+
+
+def rmsd(a: Array, b: Array, where: npt.NDArray[np.bool_]) -> Rmsd:
+    """Difference over the conditions of a mask that are known to both."""
     known = where & np.isfinite(a) & np.isfinite(b)
     count = int(np.count_nonzero(known))
     rss = float(np.sum((a[known] - b[known]) ** 2))
-    return (float(np.sqrt(rss / count)) if count else float("nan")), rss, count
+    return Rmsd(float(np.sqrt(rss / count)) if count else None, rss, count)
 
 
 def nanmean(values: Array) -> Array:
     """Mean over the first axis without NaN; NaN where nothing is left."""
-    n = np.sum(np.isfinite(values), axis=0)
-    total = np.sum(np.where(np.isfinite(values), values, 0.0), axis=0)
-    return _divided(total, np.where(n > 0, n, np.nan))
+    return _without_warning(np.nanmean, values)
 
 
 def nanmedian(values: Array) -> Array:
     """Median over the first axis without NaN; NaN where nothing is left."""
-    ordered = np.sort(np.where(np.isfinite(values), values, np.nan), axis=0)  # NaN goes last
-    n = np.sum(np.isfinite(values), axis=0)
-    last = np.maximum(n - 1, 0)
-    low = np.take_along_axis(ordered, (last // 2)[None], axis=0)[0]
-    high = np.take_along_axis(ordered, ((last + 1) // 2)[None], axis=0)[0]
-    middle: Array = 0.5 * (low + high)
-    return middle
+    return _without_warning(np.nanmedian, values)
 
 
 def nansd(values: Array) -> Array:
     """Standard deviation (n - 1) over the first axis without NaN; NaN for fewer than two values."""
-    n = np.sum(np.isfinite(values), axis=0)
-    squares = np.sum(np.where(np.isfinite(values), (values - nanmean(values)) ** 2, 0.0), axis=0)
-    return np.sqrt(_divided(squares, np.where(n > 1, n - 1.0, np.nan)))
+    return _without_warning(np.nanstd, values, ddof=1)
+
+
+def _without_warning(function: Any, values: Array, **more: int) -> Array:
+    """NumPy warns where nothing is left."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        found: Array = function(values, axis=0, **more)
+    return found
 
 
 def _divided(a: Array, b: Array) -> Array:
