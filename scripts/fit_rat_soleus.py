@@ -1,6 +1,6 @@
 """Leave one calcium level out: all six models fitted to rat soleus fibre 18Dec2017a, beside the released sets.
 
-For each model and each of five pCa the other four are fitted, with and without faults of the measurement, and the one
+For each model and each of five pCa the other four are fitted, with and without measurement artefacts, and the one
 left out is predicted. Priors come from the sets of the other fibres; the fibre's own given set, which was fitted to all
 of its pCa, is the start and the rival. Prints a Markdown table.
 """
@@ -99,7 +99,7 @@ def main(folder: Path, out: Path | None, journal: Path | None) -> None:
             ("given, calibrated", plain, "given", "calibrated"),
             ("fitted", plain, "fitted", "held_out"),
             ("fitted, calibrated", plain, "fitted", "calibrated"),
-            ("fitted with faults, calibrated", faulty, "fitted", "calibrated"),
+            ("fitted with artefacts, calibrated", faulty, "fitted", "calibrated"),
         ):
             held = [row[which][key] for row in chosen]
             train = [row[which]["training"] for row in chosen]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.diagnose.component import NAMED, OfFibre
@@ -105,8 +107,15 @@ def sets(d: Diagnosis) -> str:
     return markdown(["set", "probability", "log evidence", "RMSD", "fitted"], cells)
 
 
-def concealed(rows: Sequence[Mapping[str, Any]]) -> str:
-    """How concealed trials are predicted."""
+def predicted_rows(folder: Path) -> list[dict[str, Any]]:
+    """Rows of the held-out trials in ``predictions.json``, also of its first format."""
+    tree = json.loads((folder / "predictions.json").read_text(encoding="utf-8"))
+    rows: list[dict[str, Any]] = tree["held_out"] if "format_version" in tree else tree["concealed"]
+    return rows
+
+
+def held_out(rows: Sequence[Mapping[str, Any]]) -> str:
+    """How held-out trials are predicted."""
     answered = any("after" in row["rmsd_f0"] for row in rows)
     heads = ["tests", "trial", "base"]
     heads += ["answer", "better", "warned beforehand"] if answered else []

@@ -1,8 +1,8 @@
 """The paper's fit: ours beside direct collocation on the same made data, from the same starts.
 
 Two protocols (AMP 3.83 % L0 with RT 0.1 s, and the unconditioned stretch) at six pCa, force from 0.0843 s before the
-first stretch to 0.0843 s after the test stretch at 1 kHz, all parameters that the paper fitted; no priors and no faults
-of the measurement, so that both make the same sum of squares small. The data are the fibre's own force and noise as
+first stretch to 0.0843 s after the test stretch at 1 kHz, all parameters that the paper fitted; no priors and no
+measurement artefacts, so that both make the same sum of squares small. The data are the fibre's own force and noise as
 slow as that of real recordings; the starts are the released sets of the other fibres.
 """
 

@@ -205,7 +205,7 @@ def _start(
 
 
 def _nuisances(given: list[str] | None, training: Sequence[FitTrial]) -> tuple[list[str], dict[str, float], list[str]]:
-    """Names of faults, standard deviations of those that the user gave one, and lines on what is left out."""
+    """Names of measurement artefacts, SDs of those that the user gave one, and lines on what is left out."""
     from xb_muscle_ros.fit.ordinary import shown_by
     from xb_muscle_ros.measurement.faults import FAULTS
 

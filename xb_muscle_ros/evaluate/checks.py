@@ -1,4 +1,4 @@
-"""Is a recording fit to be evaluated? Each fault is one line that names the bag, the value and the remedy."""
+"""Is a recording fit to be evaluated? What is wrong is one line with the bag, the value and the remedy."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def evaluate(request: Request, tell: Callable[[str], None] = lambda line: None) 
         UserError: a file, fibre, model or recording cannot be used; `work` cannot be done.
         StateViolation: see `Muscle.step`.
     """
-    # Tables are read first: a fault in them shows before hours of work, and before the folder is made.
+    # Tables are read first: an error in them shows before hours of work, and before the folder is made.
     data = read_table(request.empirical, MEASURED) if request.empirical is not None else None
     golden = read_tables(request.golden, GOLDEN) if request.golden is not None else {}
     results = _recordings(request, tell) if request.bags else Results(Sections())

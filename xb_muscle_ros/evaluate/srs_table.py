@@ -163,14 +163,12 @@ class SrsTable:
 
 @functools.lru_cache(maxsize=256)
 def _pooled(table: SrsTable, kind: str, by: SrsTable | None) -> dict[str, ByClass]:
-    return {
-        name: by_class(
-            np.where(table.sound(name, kind), fibre.test, np.nan),
-            table.unconditioned(name, kind)[0],
-            table.classes(name, by),
-        )
-        for name, fibre in table.fibres.items()
-    }
+    found = {}
+    for name, fibre in table.fibres.items():
+        below, below_se = table.unconditioned(name, kind)
+        test = np.where(table.sound(name, kind), fibre.test, np.nan)
+        found[name] = by_class(test, below, table.classes(name, by), fibre.test_se, below_se)
+    return found
 
 
 @functools.lru_cache(maxsize=256)

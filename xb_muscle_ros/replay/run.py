@@ -11,6 +11,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import matching, refuse_older, write_json
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.progress import Progress
 from xb_muscle_ros.replay.report import Record, record, table, with_relative_srs
 from xb_muscle_ros.simulation.offline import simulate_trial
 from xb_muscle_ros.trials.bag_files import plain, remove_results
@@ -70,7 +71,12 @@ def replay(
         simulated = tuple(live(trials, fibre))
     else:
         muscle = Muscle(fibre)
-        simulated = tuple(simulate_trial(muscle, trial, substeps, settle_s) for trial in trials)
+        made = []
+        with Progress(len(trials), "replay") as progress:
+            for trial in trials:
+                made.append(simulate_trial(muscle, trial, substeps, settle_s))
+                progress.update()
+        simulated = tuple(made)
     records = with_relative_srs([record(trial, one, fibre) for trial, one in zip(trials, simulated, strict=True)])
     how = "live, through muscle_node" if live is not None else "offline"
     title = f"fibre {fibre.name}, model {fibre.model}, method {fibre.method} ({how})"

@@ -33,11 +33,13 @@ class ByClass(NamedTuple):
         test: mean SRS of test stretches, shape (classes, ...), F0/L0.
         unconditioned: mean SRS of unconditioned stretches of the same pCa, same shape, F0/L0.
         ratio: mean over pCa of the one over the other, same shape.
+        se: standard error of `test` over `unconditioned`, to first order, same shape; NaN where it is not known.
     """
 
     test: Array
     unconditioned: Array
     ratio: Array
+    se: Array
 
 
 class Averaged(NamedTuple):
@@ -54,24 +56,39 @@ class Averaged(NamedTuple):
     n: npt.NDArray[np.int64]
 
 
-def by_class(test: Array, unconditioned: Array, classes: npt.NDArray[np.int64]) -> ByClass:
+def by_class(
+    test: Array,
+    unconditioned: Array,
+    classes: npt.NDArray[np.int64],
+    test_se: Array | None = None,
+    unconditioned_se: Array | None = None,
+) -> ByClass:
     """Pool a fibre's pCa by activation class.
 
     Args:
         test: shape (pca, ...), SRS of test stretches, F0/L0; NaN where not measured.
         unconditioned: shape (pca,), SRS of the unconditioned stretch at each pCa, F0/L0.
         classes: shape (pca,), see `activation_class`.
+        test_se, unconditioned_se: standard errors, shapes as of the values; None or NaN where not known.
     """
-    below = np.broadcast_to(unconditioned.reshape(-1, *[1] * (test.ndim - 1)), test.shape)
+    column = (-1, *[1] * (test.ndim - 1))
+    below = np.broadcast_to(unconditioned.reshape(column), test.shape)
     both = np.isfinite(test) & np.isfinite(below)
+    errors = np.full((2, *test.shape), np.nan)
+    if test_se is not None and unconditioned_se is not None:
+        errors[0], errors[1] = test_se, unconditioned_se.reshape(column)
     shape = (len(CLASSES), *test.shape[1:])
-    pooled = ByClass(np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan))
+    pooled = ByClass(*(np.full(shape, np.nan) for _ in ByClass._fields))
     for level in range(len(CLASSES)):
         here = classes == level
         used = np.where(both[here], 1.0, np.nan)
-        pooled.test[level] = nanmean(test[here] * used)
-        pooled.unconditioned[level] = nanmean(below[here] * used)
+        pooled.test[level] = mean = nanmean(test[here] * used)
+        pooled.unconditioned[level] = mean_below = nanmean(below[here] * used)
         pooled.ratio[level] = nanmean(_divided(test[here], below[here]) * used)
+        count = np.maximum(np.sum(both[here], axis=0), 1)
+        of_test, of_below = np.sqrt(np.where(both[here], errors[:, here] ** 2, 0.0).sum(axis=1)) / count
+        divisor = np.where(mean_below != 0.0, mean_below, np.nan)
+        pooled.se[level] = np.hypot(of_test, of_below * mean / divisor) / np.abs(divisor)
     return pooled
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from xb_muscle_ros.evaluate.figures.look import MEASURED, look, shade
 from xb_muscle_ros.evaluate.sections import SrsSection
-from xb_muscle_ros.evaluate.srs_errors import pooled_error
 from xb_muscle_ros.evaluate.srs_scores import READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, place
 from xb_muscle_ros.models.titles import title_of
@@ -41,7 +40,7 @@ class _Profile:
     def __init__(self, table: SrsTable, along: str) -> None:
         pooled = table.pooled(_READING.unconditioned)
         each = np.array([p.test / np.where(p.unconditioned == 0.0, np.nan, p.unconditioned) for p in pooled.values()])
-        error = np.array([pooled_error(table, name, _READING.unconditioned, p) for name, p in pooled.items()])
+        error = np.array([p.se for p in pooled.values()])
         j, k = place(table.recovery_s, COMMON_RECOVERY_S), place(table.amplitude_l0, COMMON_AMPLITUDE_L0)
         level = CLASSES.index(COMMON_CLASS)
         empty = np.empty((each.shape[0], 0))
