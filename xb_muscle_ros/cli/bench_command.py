@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from xb_muscle_ros.bench.studies import STUDIES
-from xb_muscle_ros.cli.common import add_fibre, add_model, add_out
+from xb_muscle_ros.cli import common
 
 DESCRIPTION = "Measure how fast models and node are; the figures also go to bench.json, with the machine."
 EPILOG = f"Studies: {'; '.join(f'{name}: {study.help}' for name, study in STUDIES.items())}."
@@ -13,13 +13,13 @@ EPILOG = f"Studies: {'; '.join(f'{name}: {study.help}' for name, study in STUDIE
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    add_fibre(parser, "18Dec2017a")
-    add_model(parser)
+    common.add_fibre(parser, "18Dec2017a")
+    common.add_model(parser)
     parser.add_argument(
         "--study", nargs="+", choices=STUDIES, default=["rhs", "trial"], metavar="STUDY",
         help="what to measure, see below (default rhs trial)",
     )  # fmt: skip
-    add_out(parser, "file for the figures", "bench.json", metavar="FILE")
+    common.add_out(parser, "file for the figures", "bench.json", metavar="FILE")
     node = parser.add_argument_group("studies of a running node and the soak")
     node.add_argument(
         "--duration", type=float, default=60.0, metavar="S", help="of node, roundtrip and many, s (default 60)"
@@ -38,12 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Measure, print, write."""
     from xb_muscle_ros.bench import measure, studies
-    from xb_muscle_ros.cli.common import fibre_of
 
-    setting = measure.Setting(
-        fibre_of(arguments), arguments.out, arguments.duration, arguments.rate, arguments.priority, arguments.fibers,
-        arguments.ticks,
-    )  # fmt: skip
+    of_node = (arguments.duration, arguments.rate, arguments.priority, arguments.fibers)
+    setting = measure.Setting(common.fibre_of(arguments), arguments.out, *of_node, arguments.ticks)
     made = studies.run(arguments.study, setting, arguments.overwrite)
     print(measure.as_text(made))
     measure.write(arguments.out, made)

@@ -5,16 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from xb_muscle_ros.cli.common import (
-    add_bags,
-    add_fibre,
-    add_model,
-    add_out,
-    add_reading,
-    add_work,
-    known_of,
-    work_options_of,
-)
+from xb_muscle_ros.cli import common
 
 DESCRIPTION = (
     "Locate where recordings and simulation differ, name what physics is missing, model it, and show how well the "
@@ -24,13 +15,13 @@ DESCRIPTION = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    add_bags(parser)
-    add_fibre(
+    common.add_bags(parser)
+    common.add_fibre(
         parser, several=True, required=True,
         help="fibre files, or names of fibres in the package; with several, bags are found by the fibre's name",
     )  # fmt: skip
-    add_model(parser, changes=False)
-    add_reading(parser)
+    common.add_model(parser, changes=False)
+    common.add_reading(parser)
     parser.add_argument(
         "--features", type=Path, metavar="JSON", help="measured SRS and isometric force to be met beside the traces"
     )
@@ -42,10 +33,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--nuisance", action="extend", nargs="+", default=[], metavar="ARTEFACT=SD",
         help="SDs of measurement artefacts where the study knows better, in their units, such as time_shift=0.002 (s)",
     )  # fmt: skip
-    add_out(parser, "folder for report and results")
+    common.add_out(parser, "folder for report and results")
     parser.add_argument("--quick", action="store_true", help="search less thoroughly: minutes become tens of seconds")
     parser.add_argument("--seed", type=_seed, default=1, metavar="N", help="seed of the bootstrap (default 1)")
-    add_work(parser)
+    common.add_work(parser)
 
 
 def _seed(text: str) -> int:
@@ -72,8 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.seed,
         arguments.model,
         arguments.method,
-        work_options_of(arguments, journal=out / "journal.jsonl"),
-        known=known_of(arguments),
+        common.work_options_of(arguments, journal=out / "journal.jsonl"),
+        known=common.known_of(arguments),
         only=arguments.trials_of,
         features=arguments.features,
         predict=arguments.predict,

@@ -5,19 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from xb_muscle_ros.cli.common import (
-    add_bags,
-    add_fibre,
-    add_method,
-    add_out,
-    add_reading,
-    add_settle,
-    add_work,
-    check_settle,
-    known_of,
-    warn,
-    work_options_of,
-)
+from xb_muscle_ros.cli import common
 from xb_muscle_ros.errors import UserError
 
 DESCRIPTION = (
@@ -28,15 +16,15 @@ DESCRIPTION = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    add_bags(parser, nargs="*")
-    add_fibre(
+    common.add_bags(parser, nargs="*")
+    common.add_fibre(
         parser, several=True,
         help="fibre files or names (default: the package's file of a bag's fibre; with --paper all that were measured)",
     )  # fmt: skip
-    add_reading(parser, several=True)
+    common.add_reading(parser, several=True)
     parser.add_argument("--model", nargs="+", help="parameter sets (default: all that the fibre files have)")
-    add_method(parser)
-    add_settle(parser)
+    common.add_method(parser)
+    common.add_settle(parser)
     parser.add_argument("--measured-only", action="store_true", help="evaluate the recordings alone, without models")
     parser.add_argument("--skip-bad", action="store_true", help="leave out recordings that cannot be evaluated")
     parser.add_argument(
@@ -44,8 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--empirical", type=Path, metavar="JSON", help="measured SRS of all fibres: empirical_srs.json")
     parser.add_argument("--golden", type=Path, metavar="JSON", help="the authors' released output: golden_srs.json")
-    add_out(parser, "folder for evaluate.json, tables and figures")
-    add_work(parser)
+    common.add_out(parser, "folder for evaluate.json, tables and figures")
+    common.add_work(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -65,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise UserError("there is nothing to evaluate; give bags, or --paper --empirical JSON")
     if arguments.measured_only and (arguments.paper or arguments.model or arguments.fiber):
         raise UserError("--measured-only has no models; drop it, or --paper, --model and --fiber")
-    check_settle(arguments)
+    common.check_settle(arguments)
     refuse_older(older_results(arguments.out), arguments.overwrite)
     for name in arguments.model or ():
         split_set(name)
@@ -82,13 +70,13 @@ def run(arguments: argparse.Namespace) -> int:
         empirical=arguments.empirical,
         golden=arguments.golden,
         out=arguments.out,
-        work=work_options_of(arguments),
-        known=known_of(arguments),
+        work=common.work_options_of(arguments),
+        known=common.known_of(arguments),
         only=arguments.trials_of,
     )
-    results = evaluate(request, warn)
+    results = evaluate(request, common.warn)
     for line in results.warnings:
-        warn(line)
+        common.warn(line)
     found = results.sections
     if found.force_rmsd is not None and found.force_rmsd.overall:
         print(f"force RMSD, fibre means ± s.d.\n\n{force_table(found.force_rmsd)}\n")

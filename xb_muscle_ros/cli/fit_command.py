@@ -6,18 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xb_muscle_ros.cli.common import (
-    add_bags,
-    add_fibre,
-    add_model,
-    add_out,
-    add_reading,
-    add_work,
-    fibre_of,
-    study_of,
-    warn,
-    work_options_of,
-)
+from xb_muscle_ros.cli import common
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import matching, refuse_older, write_json
 
@@ -41,11 +30,11 @@ transducer_lag and force_drift."""
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    add_bags(parser, nargs="*")
-    add_fibre(parser, required=True)
-    add_model(parser)
-    add_reading(parser)
-    add_out(parser, "fibre file to write; the rest goes into a folder of its name", metavar="FILE")
+    common.add_bags(parser, nargs="*")
+    common.add_fibre(parser, required=True)
+    common.add_model(parser)
+    common.add_reading(parser)
+    common.add_out(parser, "fibre file to write; the rest goes into a folder of its name", metavar="FILE")
     several: dict[str, Any] = {"nargs": "+", "default": []}
     what = parser.add_argument_group("what is fitted")
     what.add_argument("--hold-out", **several, metavar="RULE", help="keep these trials out of the fit")
@@ -93,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     how.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the random starts (default 1)")
     how.add_argument("--level", type=float, default=0.95, metavar="P", help="of the intervals, a share (default 0.95)")
     how.add_argument("--no-intervals", action="store_true", help="leave the profiles out: the longest part of the work")
-    add_work(parser)
+    common.add_work(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -112,13 +101,13 @@ def run(arguments: argparse.Namespace) -> int:
     refuse_older(older, arguments.overwrite)
     if not 0.5 <= arguments.level < 1.0:
         raise UserError(f"--level is {arguments.level:g}; allowed is 0.5 up to below 1")
-    fibre = fibre_of(arguments, for_fit=True)
+    fibre = common.fibre_of(arguments, for_fit=True)
     trials = _trials(arguments, fibre)
     problem, notes = _problem(arguments, fibre, trials)
     for line in notes:
-        warn(line)
+        common.warn(line)
     settings = Settings(arguments.starts, arguments.seed, None if arguments.no_intervals else arguments.level)
-    fitted = fit(problem, settings, work_options_of(arguments, journal=folder / "journal.jsonl"))
+    fitted = fit(problem, settings, common.work_options_of(arguments, journal=folder / "journal.jsonl"))
     provenance = {
         "bags": [str(bag) for bag in arguments.bags],
         "fibre_of_trials": problem.fibre.name,
@@ -130,7 +119,7 @@ def run(arguments: argparse.Namespace) -> int:
     found = as_json(fitted, provenance, notes)
     print(table(found))
     for line in found["warnings"]:
-        warn(line)
+        common.warn(line)
     remove_results(matching(folder, *_WRITTEN))
     write_json(folder / "fit.json", found)
     for path in draw(folder, fitted, found):
@@ -146,7 +135,7 @@ def _trials(arguments: argparse.Namespace, fibre: Fibre) -> list[Trial]:
         raise UserError("nothing to fit to; give bags of trials, or --features")
     if not arguments.bags and arguments.features_of is None:
         raise UserError("without bags nobody knows whose features to fit; give --features-of")
-    trials = study_of(arguments, fibre).trials if arguments.bags else []
+    trials = common.study_of(arguments, fibre).trials if arguments.bags else []
     fibres = dict.fromkeys(trial.facts.fibre for trial in trials)
     if len(fibres) > 1:
         raise UserError(f"trials are of fibres {', '.join(fibres)}; fit one fibre at a time")

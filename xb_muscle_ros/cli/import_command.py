@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xb_muscle_ros.cli.common import add_out
+from xb_muscle_ros.cli import common
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.units import KINDS, UNITS
 
@@ -75,7 +75,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="recording, bag, or folder of such")
     parser.add_argument("--mapping", type=Path, metavar="YAML", help="columns, units and facts of the data set")
     parser.add_argument("--format", choices=FORMATS, help="format of the files (default: what each looks like)")
-    add_out(parser, "folder of the bags", "bags")
+    common.add_out(parser, "folder of the bags", "bags")
     for option, (key, kind, text) in _OPTIONS.items():
         parser.add_argument(option, type=kind, dest=".".join(key), metavar=option.rpartition("-")[2].upper(), help=text)
     parser.add_argument(

@@ -7,7 +7,7 @@ import functools
 import itertools
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_fibre, add_out, warn
+from xb_muscle_ros.cli import common
 from xb_muscle_ros.errors import UserError
 
 if TYPE_CHECKING:
@@ -26,12 +26,12 @@ DESCRIPTION = (
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
     parser.add_argument("--scene", choices=("ankle", "knee"), default="ankle", help="what to move (default ankle)")
-    add_fibre(parser, "18Dec2017a")
+    common.add_fibre(parser, "18Dec2017a")
     parser.add_argument(
         "--model", dest="models", metavar="MODEL", action="append",
         help=f"parameter set, or mujoco for MuJoCo's own muscle (may be given again; default: {', '.join(_MODELS)})",
     )  # fmt: skip
-    add_out(parser, "folder for loop.json, loop.csv and the figure")
+    common.add_out(parser, "folder for loop.json, loop.csv and the figure")
     parser.add_argument("--duration", type=float, metavar="S", help="length of the run, s (default: ankle 0.5, knee 4)")
     parser.add_argument(
         "--elastic-tendon", action="store_true", help="tendons stretch (default: rigid, as with a muscle_node)"
@@ -107,7 +107,7 @@ def run(arguments: argparse.Namespace) -> int:
             progress.update()
     for trace in traces:
         if said := beyond_in(trace):
-            warn(said)
+            common.warn(said)
     print(table(traces))
     draw_loop(arguments.out / "loop.png", traces, f"{title}; {settings['tendon']} tendons")
     for path in [*write(arguments.out, traces, settings), arguments.out / "loop.png"]:
@@ -131,5 +131,5 @@ def _fibres(name: str, models: list[str] | None) -> list[Fibre | None]:
         except UserError as error:
             if models:
                 raise
-            warn(f"model {model} is left out: {error}")
+            common.warn(f"model {model} is left out: {error}")
     return fibres

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from xb_muscle_ros.cli.common import add_fibre, add_model, fibre_of
+from xb_muscle_ros.cli import common
 
 DESCRIPTION = "List the parameter table; with --fiber the parameters of the fibre's model and their values."
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    add_fibre(parser)
-    add_model(parser)
+    common.add_fibre(parser)
+    common.add_model(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -24,7 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
     values: dict[str, float] = {}
     rows = [*CONSTANTS.values(), *PARAMETERS.values()]
     if arguments.fiber:
-        fibre = fibre_of(arguments)
+        fibre = common.fibre_of(arguments)
         values = {"reference_length_m": fibre.reference_length_m, "f0_n": fibre.f0_n, **fibre.values}
         rows = [row for row in rows if row.name in values]
         print(f"fibre {fibre.name}, model {fibre.model} (file has {', '.join(fibre.available_models)}), {fibre.path}")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from xb_muscle_ros.cli.common import add_bags, add_fibre, add_out, add_work, warn, work_options_of
+from xb_muscle_ros.cli import common
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.prove.sealing import KINDS, SINGLES
 
@@ -31,11 +31,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _add_sealed(parser: argparse.ArgumentParser) -> None:
     """Arguments of steps that make a benchmark."""
-    add_out(parser, "folder of the benchmark")
+    common.add_out(parser, "folder of the benchmark")
     parser.add_argument("--cases", type=int, required=True, metavar="N", help="how many")
     parser.add_argument("--seed", type=int, required=True, metavar="S", help="decides everything: keep it as the key")
     parser.add_argument("--key", type=Path, required=True, metavar="FILE", help="file for the truths, outside of DIR")
-    add_work(parser)
+    common.add_work(parser)
 
 
 def _make_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,23 +49,23 @@ def _make_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _spike_arguments(parser: argparse.ArgumentParser) -> None:
-    add_bags(parser)
-    add_fibre(parser, type=Path, required=True, metavar="FILE", help="fibre file")
+    common.add_bags(parser)
+    common.add_fibre(parser, type=Path, required=True, metavar="FILE", help="fibre file")
     _add_sealed(parser)
 
 
 def _run_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder of the benchmark")
-    add_out(parser, "folder for the diagnoses", metavar="RESULTS")
+    common.add_out(parser, "folder for the diagnoses", metavar="RESULTS")
     parser.add_argument("--quick", action="store_true", help="diagnose less thoroughly, see diagnose --quick")
     parser.add_argument("--tool-seed", type=int, default=1, metavar="S", help="seed of the tool (default 1)")
-    add_work(parser)
+    common.add_work(parser)
 
 
 def _score_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("results", type=Path, metavar="RESULTS", help="folder that 'prove run' wrote")
     parser.add_argument("--key", type=Path, required=True, metavar="FILE", help="the key")
-    add_out(parser, "folder for scores and figures")
+    common.add_out(parser, "folder for scores and figures")
 
 
 def _make(arguments: argparse.Namespace) -> int:
@@ -103,7 +103,7 @@ def _checked(arguments: argparse.Namespace, label: str) -> Options:
         raise UserError(f"--cases is {arguments.cases}; allowed is 1 to 9999")
     if arguments.seed < 0:
         raise UserError(f"--seed is {arguments.seed}; allowed is 0 and above")
-    return work_options_of(arguments, label, _journal(arguments))
+    return common.work_options_of(arguments, label, _journal(arguments))
 
 
 def _sealed(arguments: argparse.Namespace, sealed: str) -> int:
@@ -116,11 +116,11 @@ def _run(arguments: argparse.Namespace) -> int:
     """Diagnose all cases; 1 where the tool failed on some."""
     from xb_muscle_ros.prove.run import RESULTS, run
 
-    options = work_options_of(arguments, "prove run")
+    options = common.work_options_of(arguments, "prove run")
     results = run(arguments.folder, arguments.out, arguments.quick, arguments.tool_seed, options, arguments.overwrite)
     failed = {name: found["error"] for name, found in results["cases"].items() if "error" in found}
     for name, why in failed.items():
-        warn(f"{name}: {why}")
+        common.warn(f"{name}: {why}")
     print(f"{arguments.out / RESULTS}: {len(results['cases'])} cases, {len(failed)} that the tool could not do")
     return 1 if failed else 0
 

@@ -6,7 +6,7 @@ import argparse
 import itertools
 from dataclasses import replace
 
-from xb_muscle_ros.cli.common import add_fibre, add_model, add_out, add_settle, fibre_of, warn
+from xb_muscle_ros.cli import common
 
 # Options that are numbers, and what their ranges go by.
 _NUMBERS = {
@@ -24,8 +24,8 @@ DESCRIPTION = (
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    add_fibre(parser, required=True)
-    add_model(parser)
+    common.add_fibre(parser, required=True)
+    common.add_model(parser)
     parser.add_argument("--pca", type=float, nargs="+", default=[6.1], help="pCa of the bathing solution (default 6.1)")
     parser.add_argument(
         "--amplitude", type=float, nargs="+", default=[0.0383], metavar="L0",
@@ -36,13 +36,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="time between shortening and test stretch, s (default 0.001)",
     )  # fmt: skip
     parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="samples per second (default 1000)")
-    add_settle(parser)
+    common.add_settle(parser)
     parser.add_argument(
         "--as-measured", action="store_true",
         help="also write the force as measured force, to replay the bag like a recording",
     )  # fmt: skip
     parser.add_argument("--prefix", default="simulated", help="begins the names of the bags (default simulated)")
-    add_out(parser, "folder for the bags", "bags")
+    common.add_out(parser, "folder for the bags", "bags")
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
         value = getattr(arguments, option)
         for number in value if isinstance(value, list) else [] if value is None else [value]:
             ALLOWED[name].check(f"--{option}", number)
-    fibre = fibre_of(arguments)
+    fibre = common.fibre_of(arguments)
     planned = []
     for pca, amplitude, recovery in itertools.product(arguments.pca, arguments.amplitude, arguments.recovery):
         protocol = StretchShortenStretch(amplitude, recovery)
@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_trial(path, trial, simulated)
         low, high = simulated.force_n.min(), simulated.force_n.max()
         if told := pushing(trial, simulated, fibre.model):
-            warn(told)
+            common.warn(told)
         progress.write(f"{path}: {trial.time_s.size} samples, force {low:.3f} to {high:.3f} F0")
         progress.update()
     progress.close()
