@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -83,7 +85,7 @@ def test_aic_is_relative_where_conditions_are_the_same() -> None:
     assert shown["hill_se"] == 0.0
     assert shown["2state"] == pytest.approx(2 * 3 + 84 * np.log(0.01 / 0.04))
     assert relative_aic(scores, AicReference(None, ""))["2state"] == scores["2state"].aic
-    fewer = {**scores, "2state": scores["2state"]._replace(conditions={"large": 6, "small": 77, "all": 83})}
+    fewer = {**scores, "2state": replace(scores["2state"], conditions={"large": 6, "small": 77, "all": 83})}
     assert relative_aic(fewer, AicReference("hill_se", ""))["2state"] is None
 
 

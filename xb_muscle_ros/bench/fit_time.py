@@ -133,7 +133,7 @@ def study(setting: Setting) -> list[Figure]:
             problems[name] = made_problem(truth, load_fibre(name, truth.model, truth.method))
     methods: dict[str, Callable[[Problem], Outcome]] = {"least squares": least_squares}
     if importlib.util.find_spec("casadi") is None:
-        print(f"xb_muscle: warning: {MISSING}", file=sys.stderr)
+        Progress.write(f"xb_muscle: warning: {MISSING}", file=sys.stderr)
     else:
         methods["collocation"] = collocation
     outcomes: dict[str, dict[str, Outcome]] = {method: {} for method in methods}

@@ -204,5 +204,7 @@ def work_options_of(arguments: argparse.Namespace, label: str = "", journal: Pat
 
 
 def warn(message: str) -> None:
-    """One line on stderr."""
-    print(f"xb_muscle: warning: {message}", file=sys.stderr)
+    """One line on stderr, above a progress bar if there is one."""
+    from xb_muscle_ros.progress import Progress
+
+    Progress.write(f"xb_muscle: warning: {message}", file=sys.stderr)

@@ -67,24 +67,23 @@ def run(arguments: argparse.Namespace) -> int:
         planned.append((protocol, trial, arguments.out / f"{arguments.prefix}_{fibre.name}_{trial.facts.trial}"))
     refuse_older([path for _, _, path in planned if path.exists()], arguments.overwrite)
     muscle = Muscle(fibre)
-    progress = Progress(len(planned), "simulate")
-    for protocol, trial, path in planned:
-        calcium = float(trial.calcium_um[0])
-        corner_s, corner_l0 = protocol.corners()
-        with naming(f"trial {trial.facts.trial}"):
-            state = muscle.settle(0.0, calcium, arguments.settle)
-            # Variable steps from corner to corner: the protocol itself, not its samples.
-            states = muscle.follow(state, corner_s, corner_l0, 0.0 * corner_s + calcium, trial.time_s)
-        simulated = as_simulated(muscle, trial, trial.time_s, states)
-        source = f"simulated: fibre {fibre.name}, model {fibre.model}, method {fibre.method}"
-        trial = replace(trial, facts=replace(trial.facts, source=source))
-        if arguments.as_measured:
-            trial = replace(trial, force_time_s=trial.time_s, force_n=simulated.force_n)
-        write_trial(path, trial, simulated)
-        low, high = simulated.force_n.min(), simulated.force_n.max()
-        if told := pushing(trial, simulated, fibre.model):
-            common.warn(told)
-        progress.write(f"{path}: {trial.time_s.size} samples, force {low:.3f} to {high:.3f} F0")
-        progress.update()
-    progress.close()
+    with Progress(len(planned), "simulate") as progress:
+        for protocol, trial, path in planned:
+            calcium = float(trial.calcium_um[0])
+            corner_s, corner_l0 = protocol.corners()
+            with naming(f"trial {trial.facts.trial}"):
+                state = muscle.settle(0.0, calcium, arguments.settle)
+                # Variable steps from corner to corner: the protocol itself, not its samples.
+                states = muscle.follow(state, corner_s, corner_l0, 0.0 * corner_s + calcium, trial.time_s)
+            simulated = as_simulated(muscle, trial, trial.time_s, states)
+            source = f"simulated: fibre {fibre.name}, model {fibre.model}, method {fibre.method}"
+            trial = replace(trial, facts=replace(trial.facts, source=source))
+            if arguments.as_measured:
+                trial = replace(trial, force_time_s=trial.time_s, force_n=simulated.force_n)
+            write_trial(path, trial, simulated)
+            low, high = simulated.force_n.min(), simulated.force_n.max()
+            if told := pushing(trial, simulated, fibre.model):
+                common.warn(told)
+            progress.write(f"{path}: {trial.time_s.size} samples, force {low:.3f} to {high:.3f} F0")
+            progress.update()
     return 0

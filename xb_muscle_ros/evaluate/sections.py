@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from xb_muscle_ros.evaluate.curves import ForcePcaRow
 from xb_muscle_ros.evaluate.enhancement import EnhancementRow
 from xb_muscle_ros.evaluate.sets import ModelSet
-from xb_muscle_ros.evaluate.srs_scores import READINGS, aic_reference, profile_rmsd, relative_aic, score
+from xb_muscle_ros.evaluate.srs_scores import READINGS, SrsScores, aic_reference, profile_rmsd, relative_aic, score
 from xb_muscle_ros.evaluate.srs_table import SrsTable
 from xb_muscle_ros.evaluate.trials import MEASURED, WINDOWS, Trials
 from xb_muscle_ros.scores.estimate import Missing, notes_of
@@ -40,22 +40,11 @@ class TrialsSection:
 
 
 @dataclass(frozen=True)
-class ReadingScores:
-    """Relative SRS of a model under one reading, see `SrsScores`; `relative_aic` is the AIC less the reference's."""
-
-    rmsd: Mapping[str, float | None]
-    conditions: Mapping[str, int]
-    aic: float | None
-    relative_aic: float | None
-    profile_rmsd: Mapping[str, float | None]
-
-
-@dataclass(frozen=True)
 class ModelSrs:
     """Of one model: fibres of its table, and scores by reading."""
 
     fibres: Sequence[str]
-    under: Mapping[str, ReadingScores]
+    under: Mapping[str, SrsScores]
 
     def as_row(self) -> dict[str, Any]:
         """Entry of ``evaluate.json``."""
@@ -103,13 +92,13 @@ def srs_section(tables: Mapping[str, SrsTable], data: SrsTable, models: Sequence
     """RMSD over sets of conditions, AIC and profiles, under both readings."""
     models = [each for each in models if each.name in tables]
     reference = aic_reference(models)
-    under: dict[str, dict[str, ReadingScores]] = {each.name: {} for each in models}
+    under: dict[str, dict[str, SrsScores]] = {each.name: {} for each in models}
     for reading_name, reading in READINGS.items():
         scores = {each.name: score(tables[each.name], data, reading, each.fitted_parameters) for each in models}
         relative = relative_aic(scores, reference)
         for name, found in scores.items():
             profiles = profile_rmsd(tables[name], data, reading)
-            under[name][reading_name] = ReadingScores(*found, relative[name], profiles)
+            under[name][reading_name] = replace(found, relative_aic=relative[name], profile_rmsd=profiles)
     out = {name: data.left_out(reading.unconditioned) for name, reading in READINGS.items()}
     return SrsSection(
         list(data.fibres),

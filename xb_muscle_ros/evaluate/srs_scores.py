@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import product
 from typing import NamedTuple
 
@@ -51,18 +52,23 @@ ALL_READINGS = tuple(
 )
 
 
-class SrsScores(NamedTuple):
-    """Of one model under one reading.
+@dataclass(frozen=True)
+class SrsScores:
+    """Relative SRS of one model under one reading.
 
     Attributes:
         rmsd: by set of conditions, ``large``, ``small`` and ``all``; None where none of its conditions was measured.
         conditions: how many of each set were compared.
         aic: over all conditions; None where it cannot be had.
+        relative_aic: AIC less the reference's; None where it cannot be had, or is not asked for.
+        profile_rmsd: along each profile; None where it was not measured.
     """
 
-    rmsd: dict[str, float | None]
-    conditions: dict[str, int]
+    rmsd: Mapping[str, float | None]
+    conditions: Mapping[str, int]
     aic: float | None
+    relative_aic: float | None = None
+    profile_rmsd: Mapping[str, float | None] = field(default_factory=dict)
 
 
 @functools.lru_cache(maxsize=1024)
