@@ -161,7 +161,7 @@ def test_ctrl_c_inside_a_compiler_is_an_interruption(
                 finally:
                     raise RuntimeError("no compiled object yet")
 
-        monkeypatch.setattr(module, "parser", Parser)
+        monkeypatch.setattr(module, "build_parser", Parser)
         return module.main([])
 
     assert run(KeyboardInterrupt) == 130

@@ -1,4 +1,4 @@
-"""What can be measured: one row for each study."""
+"""What can be measured: a row for each study, and a module of this folder with a function of a `Setting`."""
 
 from __future__ import annotations
 
