@@ -157,10 +157,11 @@ def draw(points: list[Point], path: Path) -> None:
                     if not variable:
                         time_axes.axhline(1e3 * p.seconds, color=colour, linestyle=":", linewidth=1)
                         error_axes.axhline(100.0 * p.error_f0, color=colour, linestyle=":", linewidth=1)
+                    # Of the points with variable steps one alone stands in the legend.
+                    named = "" if variable and p is not points[1] else label + ", variable steps" * variable
                     both.loglog(
-                        1e3 * p.seconds, 100.0 * p.error_f0, marker, color=colour, markersize=5,
+                        1e3 * p.seconds, 100.0 * p.error_f0, marker, color=colour, markersize=5, label=named or None,
                         markerfacecolor="none" if variable else colour,
-label=None if variable and p is not points[1] else label + ", variable steps" * variable,
                     )  # fmt: skip
             time_axes.set_ylabel(f"{title}\nTime for 2.34 s (ms)")
             error_axes.set_ylabel("Force error (% F$_0$)")
