@@ -1,4 +1,4 @@
-"""The real recordings that are diagnosed: which trials are shown, which are concealed, and where the model starts."""
+"""The real recordings that are diagnosed: training trials, held-out ones, and where the model starts."""
 
 from __future__ import annotations
 
@@ -42,25 +42,25 @@ class Case:
     Attributes:
         key: of the command line and of files.
         title: of its section.
-        about: Markdown that begins its section: what is shown, what is concealed, what is assumed.
+        about: Markdown that begins its section: training trials, held-out ones, assumptions.
         imports: recordings.
-        shown: regular expressions of the trials that are diagnosed; all fibres among them are fibres of the study.
-        concealed: the same of those that are only predicted, by what they test.
-        start: the fibre that the shown trials of one fibre start from.
+        training: regular expressions of the trials that are diagnosed; all fibres among them are fibres of the study.
+        held_out: the same of those that are only predicted, by what they test.
+        start: the fibre that the training trials of one fibre start from.
         prefit: whether its parameters are fitted from several starts first.
         prepare: what is done to a trial before anything else.
         pooled: key of the study of many fibres of which this is one by itself; empty for others.
         features: whether a table has SRS and isometric force of its fibres, which are predicted as well.
         error_sds: of ordinary measurement errors, where the recordings' own description knows better.
-        alike: concealed trials were recorded as the shown ones were, so that they share errors of the whole set.
+        alike: held-out trials were recorded as the training ones were, so that they share errors of the whole set.
     """
 
     key: str
     title: str
     about: str
     imports: tuple[Source, ...]
-    shown: tuple[str, ...]
-    concealed: Mapping[str, tuple[str, ...]]
+    training: tuple[str, ...]
+    held_out: Mapping[str, tuple[str, ...]]
     start: Callable[[Sequence[Trial]], Fibre]
     prefit: bool = True
     prepare: Callable[[Trial], Trial] = field(default=lambda trial: trial)
@@ -128,8 +128,8 @@ def _of_fibres(*names: str) -> tuple[Source, ...]:
 
 
 def _pooled(model: str) -> Case:
-    about = f"""Shown: five fibres at the paper's two fitted protocols and 3 to 5 pCa, every 6 ms, diagnosed as one
-study. Concealed: the 1 kHz recordings of fibre {RAT_SOLEUS} (RT 1 ms at five pCa, triangles). {_BASES[model]} The
+    about = f"""Training: five fibres at the paper's two fitted protocols and 3 to 5 pCa, every 6 ms, diagnosed as one
+study. Held out: the 1 kHz recordings of fibre {RAT_SOLEUS} (RT 1 ms at five pCa, triangles). {_BASES[model]} The
 start is the released set of each fibre. Lengths were put in place to 2 ms, so the time shift has an SD of 2 ms. Whole
 solutions are left out in turn, so that the study's held-out errors are those of a pCa that the fit did not see."""
     title = f"Five rat soleus fibres, base `{model}`"
@@ -142,8 +142,8 @@ solutions are left out in turn, so that the study's held-out errors are those of
 
 def _single(name: str, model: str) -> Case:
     own = name == RAT_SOLEUS
-    about = f"""Shown: the fibre's recordings at the paper's two fitted protocols, every 6 ms.{
-        " Concealed: its 1 kHz recordings (RT 1 ms at five pCa, triangles)." if own else ""
+    about = f"""Training: the fibre's recordings at the paper's two fitted protocols, every 6 ms.{
+        " Held out: its 1 kHz recordings (RT 1 ms at five pCa, triangles)." if own else ""
     } {_BASES[model]}"""
     return Case(
         f"fibre_{name}_{model}",
@@ -161,29 +161,29 @@ def _single(name: str, model: str) -> Case:
     )
 
 
-_RAT = """Shown: stretch-shorten-stretch at five pCa, 1 kHz. Concealed: the two triangles of 6.4 % L0 at pCa 4.5, 6.6
+_RAT = """Training: stretch-shorten-stretch at five pCa, 1 kHz. Held out: the two triangles of 6.4 % L0 at pCa 4.5, 6.6
 and 9 (unsmoothed). The start is the released set."""
-_CAT = """Shown: the isometric reference at the short length (43) and active ramps of 3 mm/s to 9 mm from 0, 3 and 6
-mm (50, 47, 45). Concealed: the isometric references at the long length, the ramps of 27 mm/s and the passive ramps.
+_CAT = """Training: the isometric reference at the short length (43) and active ramps of 3 mm/s to 9 mm from 0, 3 and 6
+mm (50, 47, 45). Held out: the isometric references at the long length, the ramps of 27 mm/s and the passive ramps.
 The effect is known: residual force enhancement, more force after an active stretch than isometrically at the same
 length. Assumed: calcium of 8 uM while stimulated; how fast it comes and goes is not known, so force counts from a
 second after stimulation began until its end. Lengths are straight between the corners, because the model would make 3
 % F0 of the record's wobble; that wobble leaves each corner to about 10 ms, which is the SD of the time shift. The
 base is `3state_coop` with a passive spring that is exponential below its resting length (`_softplus`; resting length
-and sharpness from rest before stimulation at 0, 3 and 6 mm, which is all that is shown of passive force) and a
+and sharpness from rest before stimulation at 0, 3 and 6 mm, which is all that training has of passive force) and a
 force-length relation (`filament_overlap`, fitted with the rest). By hand, told what is missing: active titin leaves
-1.0 % F0 of the shown trials and slow passive viscoelasticity the same (log evidence 46 and 44 beside the base), so
-neither is named; a passive stretch would part them, and is among the concealed. The fit with titin predicts isometric
+1.0 % F0 of the training trials and slow passive viscoelasticity the same (log evidence 46 and 44 beside the base), so
+neither is named; a passive stretch would part them, and is held out. The fit with titin predicts isometric
 force at the long length to 6.7 and 10 % F0 (base 14 and 18) and passive ramps to 1.7 and 4.1 (12 and 16), but ramps
 of 27 mm/s to 11 to 16 (6.5 to 7.7): slow ramps leave the strain sensitivity of detachment free to triple."""
-_RELAXED = """Cross-bridges are off (no attachment): the base is a soft parallel spring. Shown: ramps of 22.5 % L0 in
-0.1, 10 and 100 s; concealed: in 1 s. F0 is an assumption (50 kPa)."""
-_BLOCKED = """Shown: relaxed ramps of 0.1 and 10 s, blocked ones of 0.1 s at pCa 6.2, 5.8 and 4.4 and of 10 s at 4.4.
-Concealed: ramps of 1 and 100 s, relaxed and at pCa 4.4. Calcium changes passive force here with cross-bridges off."""
-_GASTROCNEMIUS = """Shown: two isometric contractions, a quick release, two releases with a ramp, one stretch-shortening
-cycle of 5 Hz. Concealed: another contraction, release, two ramps and four kinds of cycles. The start is a rat soleus
-fibre, a slower muscle; calcium comes from stimulation. As for the cat, the base has a passive spring that is
-exponential below its resting length, from rest before stimulation, and a force-length relation."""
+_RELAXED = """Cross-bridges are off (no attachment): the base is a soft parallel spring. Training: ramps of 22.5 % L0 in
+0.1, 10 and 100 s; held out: in 1 s. F0 is an assumption (50 kPa)."""
+_BLOCKED = """Training: relaxed ramps of 0.1 and 10 s, blocked ones of 0.1 s at pCa 6.2, 5.8 and 4.4 and of 10 s at 4.4.
+Held out: ramps of 1 and 100 s, relaxed and at pCa 4.4. Calcium changes passive force here with cross-bridges off."""
+_GASTROCNEMIUS = """Training: two isometric contractions, a quick release, two releases with a ramp, one
+stretch-shortening cycle of 5 Hz. Held out: another contraction, release, two ramps and four kinds of cycles. The start
+is a rat soleus fibre, a slower muscle; calcium comes from stimulation. As for the cat, the base has a passive spring
+that is exponential below its resting length, from rest before stimulation, and a force-length relation."""
 _MOUSE = (Source("mouse_trabecula_titin", "mouse_trabecula_titin/*.csv"),)
 _CASES = (
     *(_pooled(model) for model in _BASES),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,18 +10,29 @@ from typing import Any
 
 from recorded_cases import Case
 from recorded_predictions import END_S
-from recorded_tables import components, concealed, feature_scores, fibres, force, places, probability, sets, table
+from recorded_tables import (
+    components,
+    feature_scores,
+    fibres,
+    force,
+    held_out,
+    places,
+    predicted_rows,
+    probability,
+    sets,
+)
 
 from xb_muscle_ros.diagnose.component import Kind
 from xb_muscle_ros.diagnose.report import output, prose
 from xb_muscle_ros.diagnose.result import Diagnosis
+from xb_muscle_ros.tables import markdown
 
 INTRO = """# Real recordings
 
-Made by `scripts/diagnose_recordings.py`: trials are imported, some of them are diagnosed, and the others, concealed
-until then, are predicted by two fibre files: the fitted base, and the answer's augmented fibre. Of a concealed trial
+Made by `scripts/diagnose_recordings.py`: trials are imported, some of them are diagnosed, and the others, held out
+until then, are predicted by two fibre files: the fitted base, and the answer's augmented fibre. Of a held-out trial
 nothing is used but its own force before anything moves, and that only for its solution's pCa shift and its force
-offset; errors of a whole set (time shift, length gain) go on to trials that were recorded with the shown ones. RMSD
+offset; errors of a whole set (time shift, length gain) go on to trials that were recorded with the training ones. RMSD
 is the root mean square of simulated less measured force, in % F0. "Held out" is that of conditions which the
 diagnosis itself left out of its fits (whole solutions where each has two trials or more).
 """
@@ -40,8 +50,8 @@ def write_page(done: Sequence[tuple[Case, Path]], images: str, former: str = "")
         images: folder of the figures, as the page links it.
         former: the page as it stands; its sections of cases that are not among `done` are kept.
     """
-    read = [(case, folder, output.read(folder), _rows(folder)) for case, folder in done]
-    made = [section(case, d, rows, images) for case, _, d, rows in read if not case.pooled or case.concealed]
+    read = [(case, folder, output.read(folder), predicted_rows(folder)) for case, folder in done]
+    made = [section(case, d, rows, images) for case, _, d, rows in read if not case.pooled or case.held_out]
     made += [_singly(key, [(c, d) for c, _, d, _ in read if c.pooled == key]) for key in _pools(read)]
     titles = {match[1] for text in made for match in _HEADING.finditer(text)}
     kept = [text for title, text in former_sections(former) if title not in titles]
@@ -64,18 +74,13 @@ def former_sections(page: str) -> list[tuple[str, str]]:
     return found
 
 
-def _rows(folder: Path) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = json.loads((folder / "predictions.json").read_text(encoding="utf-8"))["concealed"]
-    return rows
-
-
 def _pools(read: Sequence[tuple[Case, Path, Diagnosis, list[dict[str, Any]]]]) -> list[str]:
     return list(dict.fromkeys(case.pooled for case, *_ in read if case.pooled))
 
 
 def _overview(read: Sequence[tuple[Case, Path, Diagnosis, list[dict[str, Any]]]]) -> str:
     """A line for each study."""
-    heads = ["study", "base", "verdict", "answer", "held out", "concealed trials better", "worse unwarned"]
+    heads = ["study", "base", "verdict", "answer", "held out", "held-out trials better", "worse unwarned"]
     cells = []
     for case, _, d, rows in read:
         both = [(r["rmsd_f0"]["before"], r["rmsd_f0"].get("after"), r["warned"]) for r in rows]
@@ -91,7 +96,7 @@ def _overview(read: Sequence[tuple[Case, Path, Diagnosis, list[dict[str, Any]]]]
             ]
         )  # fmt: skip
     told = '"Worse unwarned": trials that the answer predicts worse than the base by more than 2 % F0, or not at all, '
-    return f"## Overview\n\n{table(heads, cells)}\n\n{told}without a warning given beforehand.\n"
+    return f"## Overview\n\n{markdown(heads, cells)}\n\n{told}without a warning given beforehand.\n"
 
 
 def _answer(d: Diagnosis) -> str:
@@ -115,30 +120,28 @@ def section(case: Case, d: Diagnosis, rows: Sequence[dict[str, Any]], images: st
         "Where the base differs most:\n\n" + places(d.mismatch),
         "What the answer leaves:\n\n" + places(d.remaining.where) if d.named else "",
         "Most probable sets:\n\n" + sets(d),
-        _concealed(d, rows),
+        _held_out(d, rows),
         "RMSD of relative SRS at conditions that no trace has (`empirical_srs.json`, readings of "
         "[evaluate.md](evaluate.md)):\n\n" + feature_scores(d)
         if d.feature_scores
         else "",
-        _lines("Warnings, given before anything concealed was looked at", d.warnings),
+        _lines("Warnings, given before any held-out trial was looked at", d.warnings),
         _lines("Missing", d.missing),
         _lines("Notes", d.notes),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def _concealed(d: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
+def _held_out(d: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
     if not rows:
         return ""
     if not d.augmented:
-        told = "Concealed trials (no mechanism is in the answer: the base alone predicts them):"
+        told = "Held-out trials (no mechanism is in the answer: the base alone predicts them):"
     else:
-        told = (
-            "Concealed trials (–: no solution at these parameters; pCa shift and offset: what each model asks of the "
-        )
+        told = "Held-out trials (–: no solution at these parameters; pCa shift and offset: what each model asks of the "
         told += "trial's force before anything moves):"
     end = f"Last column: mean force of the last {END_S:g} s, % F0."
-    return f"{told}\n\n{concealed(rows)}\n\n{end}"
+    return f"{told}\n\n{held_out(rows)}\n\n{end}"
 
 
 def _lines(head: str, lines: Sequence[str]) -> str:
@@ -165,5 +168,5 @@ def _singly(key: str, found: Sequence[tuple[Case, Diagnosis]]) -> str:
     told = "; ".join(f"{name} in {k} of {len(found)}" for name, k in count.items()) or "no mechanism in any fibre"
     return (
         f"## Each fibre by itself, base `{model}`\n\n{_MARK.format(found[0][1].format_version)}\n\n"
-        f"{table(heads, cells)}\n\nNamed with probability 0.5 and more: {told}. Key of the pooled study: `{key}`.\n"
+        f"{markdown(heads, cells)}\n\nNamed with probability 0.5 and more: {told}. Key of the pooled study: `{key}`.\n"
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from xb_muscle_ros import __version__
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import write_text
+from xb_muscle_ros.files import write_json
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.node.inputs import Scale
 from xb_muscle_ros.node.status import Account, Snapshot
@@ -111,7 +111,7 @@ def load_states(state_file: str, mode: str, stepping: SteppingOfMany) -> str:
 
 def _write(path: Path, tree: Mapping[str, object]) -> None:
     try:
-        write_text(path, json.dumps(tree, indent=1) + "\n")
+        write_json(path, tree)
     except (OSError, ValueError) as error:
         raise UserError(f"state file {path} cannot be written: {error}; set parameter 'state_file'") from error
 

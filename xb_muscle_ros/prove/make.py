@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import refuse_older, write_text
+from xb_muscle_ros.files import refuse_older, write_json
 from xb_muscle_ros.prove.sealing import BENCHMARK, COMPOSITES, SINGLES, digest, kind_of, load_benchmark, older_cases
 from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.work import JsonValue, Options, stream
@@ -74,13 +74,13 @@ def seal(out: Path, key: Path, seed: int, entries: list[Any], about: str, method
     # Keys of single effects stay what they were, to the last byte.
     of_kind = {} if kind == SINGLES else {"kind": kind}
     content = {"version": VERSION, **of_kind, "salt": salt, "seed": seed, "cases": entries}
-    write_text(key, json.dumps(content, indent=1) + "\n")
+    write_json(key, content)
     sealed = digest(key)
     public = {
         "version": VERSION, **of_kind, "about": about, "method": method, "cases": [entry["case"] for entry in entries],
         "key_sha256": sealed,
     }  # fmt: skip
-    write_text(out / BENCHMARK, json.dumps(public, indent=1) + "\n")
+    write_json(out / BENCHMARK, public)
     return sealed
 
 

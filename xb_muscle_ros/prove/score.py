@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import matching, refuse_older, write_text
+from xb_muscle_ros.files import matching, refuse_older, write_json, write_text
 from xb_muscle_ros.prove.counting import Score
 from xb_muscle_ros.prove.run import RESULTS
 from xb_muscle_ros.prove.sealing import COMPOSITES, SINGLES, kind_of, load_benchmark, open_key
+from xb_muscle_ros.tables import Columns, filled, markdown, number
 from xb_muscle_ros.trials.bag_files import remove_results
 
 
@@ -123,20 +124,22 @@ def _write(summary: Summary, key_sha256: str, out: Path) -> tuple[str, list[Path
     }
     text = table(summary.scores)
     page = f"# Scores of {tree['cases']} concealed cases\n\nKey: SHA-256 {key_sha256}\n\n{text}\n\n{summary.section}"
-    write_text(out / "scores.json", json.dumps(tree, indent=1) + "\n")
+    write_json(out / "scores.json", tree)
     write_text(out / "scores.md", page)
     return text, [out / "scores.json", out / "scores.md", *summary.draw(out)]
 
 
 def table(found: Sequence[Score]) -> str:
     """Scores as Markdown."""
-    rows = ["| score | value | 95 % interval | cases | bar | reached |", "|---|---|---|---|---|---|"]
-    for s in found:
-        told = {True: "yes", False: "no", None: ""}[s.reached]
-        bar = "" if s.bar is None else f"{'≤' if s.at_most else '≥'} {_number(s, s.bar)}"
-        between = "" if s.lower is None or s.upper is None else f"{_number(s, s.lower)} to {_number(s, s.upper)}"
-        rows.append(f"| {s.meaning} | {_number(s, s.value)} | {between} | {s.n} | {bar} | {told} |")
-    return "\n".join(rows)
+    columns: Columns[Score] = {
+        "score": lambda s: s.meaning,
+        "value": lambda s: _number(s, s.value),
+        "95 % interval": lambda s: "" if s.lower is None else f"{_number(s, s.lower)} to {_number(s, s.upper)}",
+        "cases": lambda s: str(s.n),
+        "bar": lambda s: "" if s.bar is None else f"{'≤' if s.at_most else '≥'} {_number(s, s.bar)}",
+        "reached": lambda s: {True: "yes", False: "no", None: ""}[s.reached],
+    }
+    return markdown(*filled(columns, found))
 
 
 # Scores that are no share of cases, with their decimals.
@@ -151,24 +154,17 @@ _DECIMALS = {
 
 
 def _number(s: Score, value: float | None) -> str:
-    if value is None:
-        return "–"
-    if s.name in _DECIMALS:
-        return f"{value:.{_DECIMALS[s.name]}f}"
-    return f"{100.0 * value:.0f} %"
+    return number(value, f".{_DECIMALS[s.name]}f") if s.name in _DECIMALS else number(value, ".0%").replace("%", " %")
 
 
 def _sizes(what: str, rows: Sequence[Mapping[str, Any]], size: str, heads: Sequence[str], names: Sequence[str]) -> str:
     """Shares by class of size as Markdown."""
-    out = [
-        f"## {what} by size",
-        "",
-        "| size after a refit | cases | " + " | ".join(heads) + " |",
-        "|---|---" + "|---" * len(heads) + "|",
+    cells = [
+        [
+            f"{100.0 * row[size]:g} % F0" if row[size] else "below 0.5 % F0",
+            str(row["n"]),
+            *(number(row[name]["value"], ".0%").replace("%", " %") for name in names),
+        ]
+        for row in rows
     ]
-    for row in rows:
-        shares = (row[name]["value"] for name in names)
-        told = f"{100.0 * row[size]:g} % F0" if row[size] else "below 0.5 % F0"
-        cells = " | ".join("–" if value is None else f"{100.0 * value:.0f} %" for value in shares)
-        out.append(f"| {told} | {row['n']} | {cells} |")
-    return "\n".join([*out, ""])
+    return f"## {what} by size\n\n{markdown(['size after a refit', 'cases', *heads], cells)}\n"

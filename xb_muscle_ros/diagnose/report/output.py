@@ -13,7 +13,7 @@ from xb_muscle_ros.diagnose.report.prose import headline, summary
 from xb_muscle_ros.diagnose.report.traces import TrialTraces, read_traces, write_traces
 from xb_muscle_ros.diagnose.result import Diagnosis
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import write_text
+from xb_muscle_ros.files import write_json, write_text
 
 JSON, TRACES, PAGE = "diagnosis.json", "traces.npz", "report.html"
 
@@ -32,7 +32,7 @@ def write(out: Path, d: Diagnosis, traces: Sequence[TrialTraces], page: bool = T
     """
     text = _page(d, traces) if page else None
     write_traces(out / TRACES, traces)
-    write_text(out / JSON, json.dumps(as_row(d), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    write_json(out / JSON, as_row(d))
     if text is not None:
         write_text(out / PAGE, text)
 
