@@ -44,10 +44,10 @@ def test_replay(made: xb.SimulationResult, bags: Path, tmp_path: Path, capsys: p
     printed = capsys.readouterr().out
     found = xb.replay(bags, FIBRE, model="2state")
     assert not capsys.readouterr().out
-    assert as_written(found.records) == read(out / "replay.json")["trials"]
+    assert as_written(found.rows) == read(out / "replay.json")["trials"]
     assert found.table in printed
     in_memory = xb.replay(made, FIBRE, model="2state")
-    assert in_memory.records == found.records
+    assert in_memory.rows == found.rows
     saved = found.save(tmp_path / "api")
     assert [path.name for path in saved] == ["replay.json", "replay.png"]
     assert read(saved[0]) == read(out / "replay.json")
@@ -83,10 +83,10 @@ def test_evaluate(made: xb.SimulationResult, bags: Path, tmp_path: Path, capsys:
     printed = capsys.readouterr().out
     found = xb.evaluate(bags, model=models, processes=0)
     assert not capsys.readouterr().out
-    assert as_written(found.sections) == read(tmp_path / "cli" / "evaluate.json")
+    assert as_written(found.found) == read(tmp_path / "cli" / "evaluate.json")
     assert str(found) in printed
     in_memory = xb.evaluate(made, fibre=xb.load_fibre(FIBRE), model="3state_coop", processes=0)
-    overall = [each.sections["force_rmsd"]["overall"]["3state_coop"] for each in (found, in_memory)]
+    overall = [each.found["force_rmsd"]["overall"]["3state_coop"] for each in (found, in_memory)]
     assert overall[0] == overall[1]
 
 

@@ -89,7 +89,7 @@ def test_lines_go_to_who_listens_and_to_the_result(made: xb.SimulationResult) ->
 
 def test_a_fibre_in_memory_is_taken_as_it_is(made: xb.SimulationResult) -> None:
     fibre = xb.changed(xb.load_fibre(FIBRE), {**EXACT, "f": 95.0, "k21": 20.0})
-    assert max(row["rmsd_f0"]["whole"] for row in xb.replay(made, fibre).records) < 1e-3
+    assert max(row["rmsd_f0"]["whole"] for row in xb.replay(made, fibre).rows) < 1e-3
     with pytest.raises(xb.UserError, match="is loaded with model 3state_coop, not '2state'"):
         xb.replay(made, fibre, model="2state")
     with pytest.raises(xb.UserError, match="--live gives the node a fibre file as it is"):

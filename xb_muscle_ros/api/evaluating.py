@@ -34,25 +34,25 @@ class EvaluationResult:
     """What an evaluation found.
 
     Attributes:
-        sections: what ``evaluate.json`` holds (docs/evaluate.md): force RMSD (F0), SRS (F0/L0), AIC, paired tests.
+        found: what ``evaluate.json`` holds (docs/evaluate.md): force RMSD (F0), SRS (F0/L0), AIC, paired tests.
         warnings: lines on what was left out or taken for granted.
-        results: trials and tables behind the sections.
+        results: trials and tables behind it.
         request: what was asked for.
     """
 
-    sections: Mapping[str, Any]
+    found: Mapping[str, Any]
     warnings: tuple[str, ...]
     results: Results
     request: Request
 
     def __repr__(self) -> str:
         models = ", ".join(each.name for each in self.results.models) or "no models"
-        trials = self.sections.get("trials", {}).get("used", 0)
+        trials = self.found.get("trials", {}).get("used", 0)
         return f"EvaluationResult({trials} trials; {models})"
 
     def __str__(self) -> str:
         """The tables that ``xb_muscle evaluate`` prints."""
-        found, parts = self.sections, []
+        found, parts = self.results.sections, []
         if found.get("force_rmsd", {}).get("overall"):
             parts.append(f"force RMSD, fibre means ± s.d.\n\n{force_table(found['force_rmsd'])}\n")
         if "paper" in found:
@@ -76,7 +76,7 @@ class EvaluationResult:
         Raises:
             UserError: pandas is not there, or the evaluation has no such table.
         """
-        results, found = self.results, self.sections.get("force_rmsd", {})
+        results, found = self.results, self.results.sections.get("force_rmsd", {})
         rows: dict[str, Any] = {}
         if results.trials is not None:
             rows["trials"] = lambda: trial_rows(results.trials)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from xb_muscle_ros.api.inputs import FibreLike, TrialsLike, fibre_of, known_of
 from xb_muscle_ros.api.inputs import trials_of as read
@@ -33,8 +33,7 @@ class ReplayResult(Replay):
         live: whether a running node made the forces.
         simulated: for each trial force (N), length (m) and velocity (m/s) of the contractile element and moments,
             arrays of shape (n,).
-        records: for each trial what ``replay.json`` holds: force RMSD (F0), SRS (F0/L0), isometric force (F0), with
-            standard errors.
+        records: for each trial force RMSD (F0), SRS (F0/L0), isometric force (F0), with standard errors; see `rows`.
         table: the same as text.
         trials: as replayed.
         warnings: lines on what was taken for granted.
@@ -44,12 +43,17 @@ class ReplayResult(Replay):
     warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        known = [row["rmsd_f0"]["whole"] for row in self.records if row["rmsd_f0"]["whole"] is not None]
+        known = [row["rmsd_f0"]["whole"] for row in self.rows if row["rmsd_f0"]["whole"] is not None]
         error = f", RMSD {100.0 * min(known):.2f} to {100.0 * max(known):.2f} % F0" if known else ""
         return f"ReplayResult({self.fibre.name}, {self.fibre.model}, {len(self.trials)} trials{error})"
 
+    @property
+    def rows(self) -> tuple[dict[str, Any], ...]:
+        """The records as ``replay.json`` holds them, a mapping for each trial."""
+        return tuple(self.records)
+
     def to_dataframe(self, samples_of_trials: bool = False) -> pd.DataFrame:
-        """The records, a row for each trial; columns as the keys of ``replay.json``.
+        """A row for each trial; columns as the keys of ``replay.json``.
 
         Args:
             samples_of_trials: all samples in their place, as `SimulationResult.to_dataframe` has them.
@@ -59,7 +63,7 @@ class ReplayResult(Replay):
         """
         if samples_of_trials:
             return samples(self.trials, self.simulated)
-        return dataframe(flat(row) for row in self.records)
+        return dataframe(flat(row) for row in self.rows)
 
     def plot(self) -> Figure:
         """Length, measured force and the model's force against time, nine trials at most.
@@ -129,7 +133,7 @@ def replay(
         >>> import xb_muscle_ros as xb
         >>> made = xb.simulate("18Dec2017a", recovery=0.1)
         >>> found = xb.replay(made, "18Dec2017a")
-        >>> found.records[0]["rmsd_f0"]["whole"] < 1e-4
+        >>> found.rows[0]["rmsd_f0"]["whole"] < 1e-4
         True
     """
     check_options(substeps, settle, live, bool(set))
