@@ -56,6 +56,11 @@ def write_json(path: Path, tree: Any) -> None:
     write_text(path, json.dumps(tree, indent=1, ensure_ascii=False, allow_nan=False, default=_fields) + "\n")
 
 
+def plain_tree(tree: Any) -> Any:
+    """What `write_json` writes, as mappings, lists, texts and numbers."""
+    return json.loads(json.dumps(tree, allow_nan=False, default=_fields))
+
+
 def _fields(value: Any) -> Any:
     if hasattr(value, "as_row"):
         return value.as_row()

@@ -7,8 +7,6 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xb_muscle_ros.errors import UserError
-
 if TYPE_CHECKING:
     from xb_muscle_ros.models.fibre_file import Fibre
     from xb_muscle_ros.trials.completing import Known
@@ -60,12 +58,6 @@ def add_settle(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--settle", type=float, metavar="S", help="isometric time before each trial, s (default: until at rest)"
     )
-
-
-def check_settle(arguments: argparse.Namespace) -> None:
-    """Refuse an isometric time that is none."""
-    if arguments.settle is not None and not 0.0 < arguments.settle <= 1e6:
-        raise UserError(f"--settle is {arguments.settle:g} s; allowed is above 0 to 1e6")
 
 
 def add_out(parser: argparse.ArgumentParser, what: str, default: str | None = None, metavar: str = "DIR") -> None:

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from xb_muscle_ros.cli import common
 from xb_muscle_ros.errors import UserError
 
-if TYPE_CHECKING:
-    pass
-
-# What a fit leaves beside the fibre file and its journal.
-_WRITTEN = (r"fit\.json", r"trials(_\d+)?\.(png|pdf)", r"(features|profiles|correlation)\.(png|pdf)")
 DESCRIPTION = "Fit a model to the measured force of trials; writes a fibre file, fit.json and figures."
 EPILOG = """RULE is KEY=VALUE with KEY one of trial (VALUE may have * and ?), pca, amplitude (L0), recovery (s): a
 trial meets it within what such conditions vary by. Measurement artefacts are pca_shift (per solution), length_gain,

@@ -6,14 +6,6 @@ import argparse
 
 from xb_muscle_ros.cli import common
 
-# Options that are numbers, and what their ranges go by.
-_NUMBERS = {
-    "pca": "pca",
-    "amplitude": "amplitude_l0",
-    "recovery": "recovery_s",
-    "rate": "rate_hz",
-    "settle": "settle_s",
-}
 DESCRIPTION = (
     "Simulate every combination of the given pCa, amplitudes and recovery times of the stretch-shorten-stretch "
     "protocol; one bag for each."
@@ -47,6 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulate and write, one trial after the other."""
     from xb_muscle_ros.api import simulating
     from xb_muscle_ros.files import refuse_older
+    from xb_muscle_ros.progress import Progress
     from xb_muscle_ros.simulation.offline import pushing
     from xb_muscle_ros.trials.bags import write_trial
 
@@ -57,11 +50,12 @@ def run(arguments: argparse.Namespace) -> int:
     paths = [simulating.bag_path(arguments.out, arguments.prefix, trial) for _, trial in planned]
     refuse_older([path for path in paths if path.exists()], arguments.overwrite)
     made = simulating.simulations(fibre, planned, arguments.settle, arguments.as_measured)
-    for path, (trial, simulated) in zip(paths, made, strict=True):
-        write_trial(path, trial, simulated)
-        told = pushing(trial, simulated, fibre.model)
-        if told:
-            common.warn(told)
-        low, high = simulated.force_n.min(), simulated.force_n.max()
-        print(f"{path}: {trial.time_s.size} samples, force {low:.3f} to {high:.3f} F0")
+    with Progress(len(planned), "simulate") as progress:
+        for path, (trial, simulated) in zip(paths, made, strict=True):
+            write_trial(path, trial, simulated)
+            if told := pushing(trial, simulated, fibre.model):
+                common.warn(told)
+            low, high = simulated.force_n.min(), simulated.force_n.max()
+            progress.write(f"{path}: {trial.time_s.size} samples, force {low:.3f} to {high:.3f} F0")
+            progress.update()
     return 0
