@@ -94,8 +94,8 @@ class DiagnosisResult:
         """One of the report's figures.
 
         Args:
-            which: ``before_after`` (force and its error), ``probabilities``, ``parts``, ``fibres``, ``map`` or
-                ``laws``.
+            which: ``before_after`` (force and its error), ``probabilities``, ``contributions``, ``fibres``,
+                ``map`` or ``laws``.
 
         Returns:
             a Matplotlib figure.
@@ -118,7 +118,7 @@ class DiagnosisResult:
         return {
             "before_after": lambda: before_after.draw_before_after(d, traces),
             "probabilities": lambda: probabilities.draw_probabilities(d),
-            "parts": lambda: parts.draw_parts(d, traces),
+            "contributions": lambda: parts.draw_parts(d, traces),
             "fibres": lambda: fibres.draw_fibres(d),
             "map": lambda: remains.draw_map(d),
             "laws": lambda: laws.draw_laws(d),

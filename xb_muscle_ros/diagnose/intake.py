@@ -81,34 +81,6 @@ def read_fibres(
     return studies
 
 
-def studies_of(trials: Sequence[Trial], fibres: Sequence[Fibre]) -> tuple[FibreStudy, ...]:
-    """A study of trials in memory, complete and checked already.
-
-    Args:
-        trials: in the order of recording; of one fibre file all of them, of several each fibre's own.
-        fibres: where the base models start.
-
-    Raises:
-        UserError: see `read_fibres`.
-    """
-    if not fibres:
-        raise UserError("there is no fibre file to start from; give one with --fiber")
-    _check_files(fibres)
-    named = list(dict.fromkeys(trial.facts.fibre for trial in trials))
-    if len(fibres) == 1:
-        return (_checked(FibreStudy(fibres[0], tuple(trials), tuple(_others_line(named, fibres[0].name)))),)
-    files = [fibre.name for fibre in fibres]
-    if set(named) != set(files):
-        raise UserError(
-            f"trials are of fibres {_listed(named)}, fibre files of {_listed(files)}; give files and trials of the same"
-        )
-    studies = tuple(
-        _checked(FibreStudy(fibre, tuple(t for t in trials if t.facts.fibre == fibre.name), ())) for fibre in fibres
-    )
-    _check_conditions(studies)
-    return studies
-
-
 def _check_files(fibres: Sequence[Fibre]) -> None:
     """Each fibre once, and one base model for all."""
     names = [f.name for f in fibres]
@@ -147,6 +119,34 @@ def _by_name(bags: Sequence[str | Path], fibres: Sequence[Fibre], known: Known) 
         notes = counted(told for _, told in read)
         found.append(FibreStudy(fibre, tuple(trial for trial, _ in read), tuple(notes)))
     return found
+
+
+def studies_of(trials: Sequence[Trial], fibres: Sequence[Fibre]) -> tuple[FibreStudy, ...]:
+    """A study of trials in memory, complete and checked already.
+
+    Args:
+        trials: in the order of recording; of one fibre file all of them, of several each fibre's own.
+        fibres: where the base models start.
+
+    Raises:
+        UserError: see `read_fibres`.
+    """
+    if not fibres:
+        raise UserError("there is no fibre file to start from; give one with --fiber")
+    _check_files(fibres)
+    named = list(dict.fromkeys(trial.facts.fibre for trial in trials))
+    if len(fibres) == 1:
+        return (_checked(FibreStudy(fibres[0], tuple(trials), tuple(_others_line(named, fibres[0].name)))),)
+    files = [fibre.name for fibre in fibres]
+    if set(named) != set(files):
+        raise UserError(
+            f"trials are of fibres {_listed(named)}, fibre files of {_listed(files)}; give files and trials of the same"
+        )
+    studies = tuple(
+        _checked(FibreStudy(fibre, tuple(t for t in trials if t.facts.fibre == fibre.name), ())) for fibre in fibres
+    )
+    _check_conditions(studies)
+    return studies
 
 
 def _others(bags: Sequence[str | Path], fibre: str) -> list[str]:
