@@ -25,6 +25,7 @@ from xb_muscle_ros.diagnose.search.system import Names, ordered
 from xb_muscle_ros.diagnose.searching import fit_base
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import write_text
+from xb_muscle_ros.tables import NOTHING, markdown, number
 
 
 def singles(explorer: Explorer) -> list[Names]:
@@ -51,21 +52,25 @@ def pairs(explorer: Explorer, alone: Sequence[Names]) -> list[Names]:
 def table(explorer: Explorer, heldout: HeldOut, sets: Sequence[Names]) -> str:
     """Markdown: evidence, and RMSD of fit and of left-out conditions by set, % F0; the most evidence first."""
     fibres = [s.fibre.name for s in explorer.systems]
-    lines = [
-        f"| on top of `{explorer.systems[0].fibre.model}` | log evidence | fitted | " + " | ".join(fibres)
-        + " | all left out | of base |",
-        "|---" * (len(fibres) + 5) + "|",
-    ]  # fmt: skip
+    head = [
+        f"on top of `{explorer.systems[0].fibre.model}`",
+        "log evidence",
+        "fitted",
+        *fibres,
+        "all left out",
+        "of base",
+    ]
+    rows = []
     base = heldout.rmsd(())
     for names in sorted(sets, key=explorer.evidence, reverse=True):
         fitted = float(np.sqrt(np.mean([f.mean_square_f0 for f in explorer.fits[names]])))
         cells = [heldout.rmsd(names, i) for i in range(len(fibres))] + [heldout.rmsd(names)]
-        held = [f"{100.0 * c:.2f}" if c is not None else "–" for c in cells]
-        share = "–" if cells[-1] is None or not base else f"{cells[-1] / base:.2f}"
+        held = [number(c, ".2f", 100.0) for c in cells]
+        share = NOTHING if cells[-1] is None or not base else f"{cells[-1] / base:.2f}"
         gained = explorer.evidence(names) - explorer.evidence(())
         title = " + ".join(f"`{n.value}`" for n in names) or "nothing"
-        lines.append(f"| {title} | {gained:+.1f} | {100.0 * fitted:.2f} | " + " | ".join([*held, share]) + " |")
-    return "\n".join(lines) + "\n"
+        rows.append([title, f"{gained:+.1f}", f"{100.0 * fitted:.2f}", *held, share])
+    return markdown(head, rows) + "\n"
 
 
 def main(given: argparse.Namespace) -> None:

@@ -1,6 +1,6 @@
 """Diagnose real recordings: what differs, what explains it, and how well that predicts held-out trials.
 
-For each case (see `recorded_cases`) the recordings are imported, the trials that are shown are diagnosed, and the
+For each case (see `recorded_cases`) the recordings are imported, the training trials are diagnosed, and the
 held-out ones are predicted by the base and by the answer's augmented fibre. Cases can be run one by one: one that is
 done is kept, one that was interrupted goes on from its journal. Each leaves in <out>/<case> what `xb_muscle diagnose`
 writes, `start*.yaml` and `base*.yaml` (where the model started, and the fitted base) and `predictions.json`. Figures go
@@ -10,7 +10,6 @@ to --images, the page to --page; sections of cases that are not in <out> stay as
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Sequence
@@ -32,7 +31,7 @@ from xb_muscle_ros.diagnose.outputs import JSON, read, write
 from xb_muscle_ros.diagnose.result import Diagnosis
 from xb_muscle_ros.diagnose.run import diagnose
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import replaced, write_text
+from xb_muscle_ros.files import replaced, write_json, write_text
 from xb_muscle_ros.fit.coordinates import parameter_coordinates
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.problem import Problem
@@ -78,7 +77,7 @@ def main() -> int:
             failed += 1
     done = [(c, given.out / c.key) for c in CASES.values() if (given.out / c.key / "predictions.json").exists()]
     for case, folder in done:
-        if not case.pooled or case.heldout:
+        if not case.pooled or case.held_out:
             print(write_figure(folder, given.images / f"recorded_{case.key}.png"))
     page = write_page(done, os.path.relpath(given.images, given.page.parent), _text(given.page))
     write_text(given.page, page)
@@ -112,36 +111,36 @@ def run_case(
         UserError: recordings are absent or cannot be read, or none of them are those of the case.
     """
     trials = imported(case, recordings, folder / "bags")
-    shown, heldout = chosen(trials, case.shown), {n: chosen(trials, p) for n, p in case.heldout.items()}
-    absent = [p for p in (*case.shown, *sum(case.heldout.values(), ())) if not chosen(trials, [p])]
+    training, held_out = chosen(trials, case.training), {n: chosen(trials, p) for n, p in case.held_out.items()}
+    absent = [p for p in (*case.training, *sum(case.held_out.values(), ())) if not chosen(trials, [p])]
     if absent:
         raise UserError(f"no recording of {', '.join(absent)}; name all folders of recordings with --recordings")
     if not (folder / JSON).exists():
-        diagnose_shown(case, shown, features, folder, quick, replace(options, journal=folder / "journal.jsonl"))
+        diagnose_training(case, training, features, folder, quick, replace(options, journal=folder / "journal.jsonl"))
     d = read(folder)
     bases = [base_fibre(load_fibre(folder / _file("start", name, d)), d) for name in d.fibres]
     for base in bases:
         write_fibre(folder / _file("base", base.name, d), base, ["The base of the diagnosis beside it, as fitted."])
-    rows, arrays = predictions(d, folder, bases, heldout, case.alike)
+    rows, arrays = predictions(d, folder, bases, held_out, case.alike)
     for row in rows:
         row["warned"] = warned_beforehand(d, row["fibre"])
     with replaced(folder / "predictions.npz") as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)
-    write_text(folder / "predictions.json", json.dumps({"case": case.key, "heldout": rows}, indent=1) + "\n")
+    write_json(folder / "predictions.json", {"format_version": 2, "case": case.key, "held_out": rows})
 
 
 def _file(kind: str, fibre: str, d: Diagnosis) -> str:
     return f"{kind}_{fibre}.yaml" if len(d.fibres) > 1 else f"{kind}.yaml"
 
 
-def diagnose_shown(
-    case: Case, shown: Sequence[Trial], features: Path | None, folder: Path, quick: bool, options: Options
+def diagnose_training(
+    case: Case, training: Sequence[Trial], features: Path | None, folder: Path, quick: bool, options: Options
 ) -> None:
-    """Diagnose the trials that are shown, each fibre from its own start, and write what was found."""
-    names = list(dict.fromkeys(t.facts.fibre for t in shown))
+    """Diagnose the training trials, each fibre from its own start, and write what was found."""
+    names = list(dict.fromkeys(t.facts.fibre for t in training))
     studies = []
     for name in names:
-        own = tuple(t for t in shown if t.facts.fibre == name)
+        own = tuple(t for t in training if t.facts.fibre == name)
         if len(own) < 3:
             raise UserError(f"{len(own)} trials of fibre {name} are to be diagnosed; needed are 3")
         start = case.start(own)

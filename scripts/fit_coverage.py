@@ -9,7 +9,6 @@ fitted beside the parameters (fitted) or not (ignored).
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.files import write_text
+from xb_muscle_ros.files import write_json
 from xb_muscle_ros.fit.coordinates import FITTED, Choice, fault_coordinates, parameter_coordinates
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.problem import Problem
@@ -135,7 +134,7 @@ def main(cases: int, shared: dict[str, Any], out: Path, journal: Path | None) ->
     """Run the cases and print what came of them."""
     tasks = [{"seed": seed, **shared} for seed in range(cases)]
     done = run(case, tasks, Options(journal=journal, label="cases"))
-    write_text(out, json.dumps(done, indent=1) + "\n")
+    write_json(out, done)
     held = np.array([c["heldout_rmsd_f0"] for c in done])
     error = np.array([c["heldout_error_f0"] for c in done])
     print(f"{cases} cases, made by {shared['truth']}, fitted by {shared['method']}")

@@ -1,6 +1,6 @@
 """Leave one calcium level out: all six models fitted to rat soleus fibre 18Dec2017a, beside the released sets.
 
-For each model and each of five pCa the other four are fitted, with and without faults of the measurement, and the one
+For each model and each of five pCa the other four are fitted, with and without measurement artefacts, and the one
 left out is predicted. Priors come from the sets of the other fibres; the fibre's own given set, which was fitted to all
 of its pCa, is the start and the rival. Prints a Markdown table.
 """
@@ -8,7 +8,6 @@ of its pCa, is the start and the rival. Prints a Markdown table.
 from __future__ import annotations
 
 import argparse
-import json
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -16,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.files import write_text
+from xb_muscle_ros.files import write_json
 from xb_muscle_ros.fit.calibration import calibrated_force
 from xb_muscle_ros.fit.coordinates import fault_coordinates, parameter_coordinates, population_choices
 from xb_muscle_ros.fit.data import FitTrial, fit_trials
@@ -89,7 +88,7 @@ def main(folder: Path, out: Path | None, journal: Path | None) -> None:
         for i, (task, row) in enumerate(zip(tasks, rows, strict=True))
     ]
     if out is not None:
-        write_text(out, json.dumps(made, indent=1) + "\n")
+        write_json(out, made)
     heads = ["model", "set", *(f"pCa {pca:g}" for pca in pcas), "all", "training"]
     print("| " + " | ".join(heads) + " |\n|" + "---|" * len(heads))
     for model in MODELS:
@@ -100,7 +99,7 @@ def main(folder: Path, out: Path | None, journal: Path | None) -> None:
             ("given, calibrated", plain, "given", "calibrated"),
             ("fitted", plain, "fitted", "held_out"),
             ("fitted, calibrated", plain, "fitted", "calibrated"),
-            ("fitted with faults, calibrated", faulty, "fitted", "calibrated"),
+            ("fitted with artefacts, calibrated", faulty, "fitted", "calibrated"),
         ):
             held = [row[which][key] for row in chosen]
             train = [row[which]["training"] for row in chosen]

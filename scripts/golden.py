@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import sys
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from xb_muscle_ros.bench.golden import QUANTITIES, STEPPERS, Cell, compare
 from xb_muscle_ros.evaluate.golden import SETS
+from xb_muscle_ros.tables import write_csv
 
 # Table -> largest median and largest single error that are accepted.
 BARS = {
@@ -56,13 +56,12 @@ def main(golden: Path, tables: list[str], every: tuple[int, int, int, int], out:
             print(f"  {len(here)} of {len(cells)} cells of {table}; reason: {reason}")
         beyond += sum(c.error > limit for c in here)
     if out is not None:
-        with out.open("w", newline="", encoding="utf-8") as file:
-            table_of = csv.writer(file, lineterminator="\n")
-            table_of.writerow([*Cell._fields, "error", "reason"])
-            for c, reason in listed:
-                numbers = [f"{x:.6g}" if isinstance(x, float) else x for x in c]
-                table_of.writerow([*numbers, f"{c.error:.4f}", reason])
+        write_csv(out, ({**_row(c), "error": f"{c.error:.4f}", "reason": reason} for c, reason in listed))
     return 1 if beyond else 0
+
+
+def _row(cell: Cell) -> dict[str, object]:
+    return {name: f"{x:.6g}" if isinstance(x, float) else x for name, x in cell._asdict().items()}
 
 
 if __name__ == "__main__":

@@ -42,25 +42,25 @@ class Case:
     Attributes:
         key: of the command line and of files.
         title: of its section.
-        about: Markdown that begins its section: what is for training, what is held out, what is assumed.
+        about: Markdown that begins its section: training trials, test trials, assumptions.
         imports: recordings.
-        shown: regular expressions of the trials that are diagnosed; all fibres among them are fibres of the study.
-        heldout: the same of those that are only predicted, by what they test.
+        training: regular expressions of the trials that are diagnosed; all fibres among them are fibres of the study.
+        held_out: the same of those that are only predicted, by what they test.
         start: the fibre that the training trials of one fibre start from.
         prefit: whether its parameters are fitted from several starts first.
         prepare: what is done to a trial before anything else.
         pooled: key of the study of many fibres of which this is one by itself; empty for others.
         features: whether a table has SRS and isometric force of its fibres, which are predicted as well.
         error_sds: of ordinary measurement errors, where the recordings' own description knows better.
-        alike: held-out trials were recorded as the shown ones were, so that they share errors of the whole set.
+        alike: held-out trials were recorded as the training ones were, so that they share errors of the whole set.
     """
 
     key: str
     title: str
     about: str
     imports: tuple[Source, ...]
-    shown: tuple[str, ...]
-    heldout: Mapping[str, tuple[str, ...]]
+    training: tuple[str, ...]
+    held_out: Mapping[str, tuple[str, ...]]
     start: Callable[[Sequence[Trial]], Fibre]
     prefit: bool = True
     prepare: Callable[[Trial], Trial] = field(default=lambda trial: trial)
@@ -128,11 +128,11 @@ def _of_fibres(*names: str) -> tuple[Source, ...]:
 
 
 def _pooled(model: str) -> Case:
-    about = f"""Training trials: five fibres at the paper's two fitted protocols and 3 to 5 pCa, every 6 ms,
-diagnosed as one
-study. Test trials: the 1 kHz recordings of fibre {RAT_SOLEUS} (RT 1 ms at five pCa, triangles). {_BASES[model]} The
-start is the released set of each fibre. Lengths were put in place to 2 ms, so the time shift has an SD of 2 ms. Whole
-solutions are left out in turn, so that the study's held-out errors are those of a pCa that the fit did not see."""
+    about = f"""Training trials: five fibres at the paper's two fitted protocols and 3 to 5 pCa, every 6 ms, diagnosed
+as one study. Test trials: the 1 kHz recordings of fibre {RAT_SOLEUS} (RT 1 ms at five pCa, triangles). {_BASES[model]}
+The start is the released set of each fibre. Lengths were put in place to 2 ms, so the time shift has an SD of 2 ms.
+Whole solutions are left out in turn, so that the study's held-out errors are those of a pCa that the fit did not
+see."""
     title = f"Five rat soleus fibres, base `{model}`"
     imports = (*_of_fibres(*FIBRES), *_KILOHERTZ)
     return Case(
@@ -162,35 +162,30 @@ def _single(name: str, model: str) -> Case:
     )
 
 
-_RAT = """Training trials: stretch-shorten-stretch at five pCa, 1 kHz. Test trials: the two triangles of 6.4 %
-L0 at pCa 4.5, 6.6
-and 9 (unsmoothed). The start is the released set."""
-_CAT = """Training trials: the isometric reference at the short length (43) and active ramps of 3 mm/s to 9 mm
-from 0, 3 and 6
-mm (50, 47, 45). Test trials: the isometric references at the long length, the ramps of 27 mm/s and the passive ramps.
-The effect is known: residual force enhancement, more force after an active stretch than isometrically at the same
-length. Assumed: calcium of 8 uM while stimulated; how fast it comes and goes is not known, so force counts from a
-second after stimulation began until its end. Lengths are straight between the corners, because the model would make 3
-% F0 of the record's wobble; that wobble leaves each corner to about 10 ms, which is the SD of the time shift. The
-base is `3state_coop` with a passive spring that is exponential below its resting length (`_softplus`; resting length
-and sharpness from rest before stimulation at 0, 3 and 6 mm, which is all that training trials have of passive
-force) and a
-force-length relation (`filament_overlap`, fitted with the rest). By hand, told what is missing: active titin leaves
-1.0 % F0 of the training trials and slow passive viscoelasticity the same (log evidence 46 and 44 beside the base), so
+_RAT = """Training trials: stretch-shorten-stretch at five pCa, 1 kHz. Test trials: the two triangles of 6.4 % L0 at pCa
+4.5, 6.6 and 9 (unsmoothed). The start is the released set."""
+_CAT = """Training trials: the isometric reference at the short length (43) and active ramps of 3 mm/s to 9 mm from 0, 3
+and 6 mm (50, 47, 45). Test trials: the isometric references at the long length, the ramps of 27 mm/s and the passive
+ramps. The effect is known: residual force enhancement, more force after an active stretch than isometrically at the
+same length. Assumed: calcium of 8 uM while stimulated; how fast it comes and goes is not known, so force counts from a
+second after stimulation began until its end. Lengths are straight between the corners, because the model would make 3 %
+F0 of the record's wobble; that wobble leaves each corner to about 10 ms, which is the SD of the time shift. The base is
+`3state_coop` with a passive spring that is exponential below its resting length (`_softplus`; resting length and
+sharpness from rest before stimulation at 0, 3 and 6 mm, which is all that training trials have of passive force) and a
+force-length relation (`filament_overlap`, fitted with the rest). By hand, told what is missing: active titin leaves 1.0
+% F0 of the training trials and slow passive viscoelasticity the same (log evidence 46 and 44 beside the base), so
 neither is named; a passive stretch would part them, and is among the test trials. The fit with titin predicts isometric
-force at the long length to 6.7 and 10 % F0 (base 14 and 18) and passive ramps to 1.7 and 4.1 (12 and 16), but ramps
-of 27 mm/s to 11 to 16 (6.5 to 7.7): slow ramps leave the strain sensitivity of detachment free to triple."""
-_RELAXED = """Cross-bridges are off (no attachment): the base is a soft parallel spring. Training trials: ramps
-of 22.5 % L0 in
-0.1, 10 and 100 s; test trial: in 1 s. F0 is an assumption (50 kPa)."""
-_BLOCKED = """Training trials: relaxed ramps of 0.1 and 10 s, blocked ones of 0.1 s at pCa 6.2, 5.8 and 4.4 and
-of 10 s at 4.4.
-Test trials: ramps of 1 and 100 s, relaxed and at pCa 4.4. Calcium changes passive force here with cross-bridges off."""
+force at the long length to 6.7 and 10 % F0 (base 14 and 18) and passive ramps to 1.7 and 4.1 (12 and 16), but ramps of
+27 mm/s to 11 to 16 (6.5 to 7.7): slow ramps leave the strain sensitivity of detachment free to triple."""
+_RELAXED = """Cross-bridges are off (no attachment): the base is a soft parallel spring. Training trials: ramps of 22.5
+% L0 in 0.1, 10 and 100 s; test trial: in 1 s. F0 is an assumption (50 kPa)."""
+_BLOCKED = """Training trials: relaxed ramps of 0.1 and 10 s, blocked ones of 0.1 s at pCa 6.2, 5.8 and 4.4 and of 10 s
+at 4.4. Test trials: ramps of 1 and 100 s, relaxed and at pCa 4.4. Calcium changes passive force here with cross-bridges
+off."""
 _GASTROCNEMIUS = """Training trials: two isometric contractions, a quick release, two releases with a ramp, one
-stretch-shortening
-cycle of 5 Hz. Test trials: another contraction, release, two ramps and four kinds of cycles. The start is a rat soleus
-fibre, a slower muscle; calcium comes from stimulation. As for the cat, the base has a passive spring that is
-exponential below its resting length, from rest before stimulation, and a force-length relation."""
+stretch-shortening cycle of 5 Hz. Test trials: another contraction, release, two ramps and four kinds of cycles. The
+start is a rat soleus fibre, a slower muscle; calcium comes from stimulation. As for the cat, the base has a passive
+spring that is exponential below its resting length, from rest before stimulation, and a force-length relation."""
 _MOUSE = (Source("mouse_trabecula_titin", "mouse_trabecula_titin/*.csv"),)
 _CASES = (
     *(_pooled(model) for model in _BASES),

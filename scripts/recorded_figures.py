@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from recorded_tables import predicted_rows
 
 from xb_muscle_ros.diagnose import outputs
 from xb_muscle_ros.diagnose.report.traces import TrialTraces, read_traces
@@ -35,17 +35,14 @@ class _Panel(NamedTuple):
 def write_figure(folder: Path, path: Path) -> Path:
     """Draw a case's traces from what was written into its folder; returns the path."""
     d = outputs.read(folder)
-    found = json.loads((folder / "predictions.json").read_text(encoding="utf-8"))
     several = len(d.fibres) > 1
-    shown = [_of_shown(t, several, bool(d.named)) for t in _typical(read_traces(folder / outputs.TRACES))]
+    training = [_of_training(t, several, bool(d.named)) for t in _typical(read_traces(folder / outputs.TRACES))]
     with np.load(folder / "predictions.npz") as arrays:
-        # Files of the former version call them concealed.
-        rows = found["heldout" if "heldout" in found else "concealed"]
-        hidden = [_of_heldout(arrays, k, row, several) for k, row in enumerate(rows)]
-    above, below = math.ceil(len(shown) / _COLUMNS), math.ceil(len(hidden) / _COLUMNS)
+        hidden = [_of_held_out(arrays, k, row, several) for k, row in enumerate(predicted_rows(folder))]
+    above, below = math.ceil(len(training) / _COLUMNS), math.ceil(len(hidden) / _COLUMNS)
     with figure(180.0, 42.0 * (above + below) + 8.0) as made:
         axes = made.subplots(above + below, _COLUMNS, squeeze=False)
-        panels: list[_Panel | None] = [*shown, *[None] * (above * _COLUMNS - len(shown)), *hidden]
+        panels: list[_Panel | None] = [*training, *[None] * (above * _COLUMNS - len(training)), *hidden]
         for ax, panel in zip(axes.flat, [*panels, *[None] * (axes.size - len(panels))], strict=True):
             if panel is None:
                 ax.axis("off")
@@ -74,12 +71,12 @@ def _typical(traces: Sequence[TrialTraces]) -> list[TrialTraces]:
     return [t for i, t in enumerate(traces) if i in kept]
 
 
-def _of_shown(t: TrialTraces, several: bool, named: bool) -> _Panel:
+def _of_training(t: TrialTraces, several: bool, named: bool) -> _Panel:
     title = f"{t.fibre}\n{t.trial}" if several else t.trial
     return _Panel(title, t.time_s, t.measured_f0, t.before_f0, t.after_f0 if named else None)
 
 
-def _of_heldout(arrays: Any, k: int, row: dict[str, Any], several: bool) -> _Panel:
+def _of_held_out(arrays: Any, k: int, row: dict[str, Any], several: bool) -> _Panel:
     name = row["trial"].split("_trial")[-1] if "_trial" in row["trial"] else row["trial"]
     title = f"held out: {row['tests']}\n{row['fibre']} {name}" if several else f"held out: {row['tests']}\n{name}"
     after = arrays.get(f"p{k}_after_f0")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,12 +10,23 @@ from typing import Any
 
 from recorded_cases import Case
 from recorded_predictions import END_S
-from recorded_tables import components, feature_scores, fibres, force, heldout, places, probability, sets, table
+from recorded_tables import (
+    components,
+    feature_scores,
+    fibres,
+    force,
+    held_out,
+    places,
+    predicted_rows,
+    probability,
+    sets,
+)
 
 from xb_muscle_ros.diagnose import outputs
 from xb_muscle_ros.diagnose.component import Kind
 from xb_muscle_ros.diagnose.report import prose
 from xb_muscle_ros.diagnose.result import Diagnosis
+from xb_muscle_ros.tables import markdown
 
 INTRO = """# Real recordings
 
@@ -41,8 +51,8 @@ def write_page(done: Sequence[tuple[Case, Path]], images: str, former: str = "")
         images: folder of the figures, as the page links it.
         former: the page as it stands; its sections of cases that are not among `done` are kept.
     """
-    read = [(case, folder, outputs.read(folder), _rows(folder)) for case, folder in done]
-    made = [section(case, d, rows, images) for case, _, d, rows in read if not case.pooled or case.heldout]
+    read = [(case, folder, outputs.read(folder), predicted_rows(folder)) for case, folder in done]
+    made = [section(case, d, rows, images) for case, _, d, rows in read if not case.pooled or case.held_out]
     made += [_singly(key, [(c, d) for c, _, d, _ in read if c.pooled == key]) for key in _pools(read)]
     titles = {match[1] for text in made for match in _HEADING.finditer(text)}
     kept = [text for title, text in former_sections(former) if title not in titles]
@@ -63,13 +73,6 @@ def former_sections(page: str) -> list[tuple[str, str]]:
             text = f"{head}\n\n{FORMER}\n{rest}"
         found.append((title, text))
     return found
-
-
-def _rows(folder: Path) -> list[dict[str, Any]]:
-    found = json.loads((folder / "predictions.json").read_text(encoding="utf-8"))
-    # Files of the former version call them so.
-    rows: list[dict[str, Any]] = found["heldout"] if "heldout" in found else found["concealed"]
-    return rows
 
 
 def _pools(read: Sequence[tuple[Case, Path, Diagnosis, list[dict[str, Any]]]]) -> list[str]:
@@ -94,7 +97,7 @@ def _overview(read: Sequence[tuple[Case, Path, Diagnosis, list[dict[str, Any]]]]
             ]
         )  # fmt: skip
     told = '"Worse unwarned": trials that the answer predicts worse than the base by more than 2 % F0, or not at all, '
-    return f"## Overview\n\n{table(heads, cells)}\n\n{told}without a warning given beforehand.\n"
+    return f"## Overview\n\n{markdown(heads, cells)}\n\n{told}without a warning given beforehand.\n"
 
 
 def _answer(d: Diagnosis) -> str:
@@ -118,7 +121,7 @@ def section(case: Case, d: Diagnosis, rows: Sequence[dict[str, Any]], images: st
         "Where the base differs most:\n\n" + places(d.mismatch),
         "What the answer leaves:\n\n" + places(d.residual.places) if d.named else "",
         "Most probable sets:\n\n" + sets(d),
-        _heldout(d, rows),
+        _held_out(d, rows),
         "RMSD of relative SRS at conditions that no trace has (`empirical_srs.json`, readings of "
         "[evaluate.md](evaluate.md)):\n\n" + feature_scores(d)
         if d.feature_scores
@@ -130,7 +133,7 @@ def section(case: Case, d: Diagnosis, rows: Sequence[dict[str, Any]], images: st
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def _heldout(d: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
+def _held_out(d: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
     if not rows:
         return ""
     if not d.augmented:
@@ -139,7 +142,7 @@ def _heldout(d: Diagnosis, rows: Sequence[dict[str, Any]]) -> str:
         told = "Test trials (–: no solution at these parameters; pCa shift and offset: what each model asks of the "
         told += "trial's force before anything moves):"
     end = f"Last column: mean force of the last {END_S:g} s, % F0."
-    return f"{told}\n\n{heldout(rows)}\n\n{end}"
+    return f"{told}\n\n{held_out(rows)}\n\n{end}"
 
 
 def _lines(head: str, lines: Sequence[str]) -> str:
@@ -166,5 +169,5 @@ def _singly(key: str, found: Sequence[tuple[Case, Diagnosis]]) -> str:
     told = "; ".join(f"{name} in {k} of {len(found)}" for name, k in count.items()) or "no mechanism in any fibre"
     return (
         f"## Each fibre by itself, base `{model}`\n\n{_MARK.format(found[0][1].format_version)}\n\n"
-        f"{table(heads, cells)}\n\nNamed with probability 0.5 and more: {told}. Key of the pooled study: `{key}`.\n"
+        f"{markdown(heads, cells)}\n\nNamed with probability 0.5 and more: {told}. Key of the pooled study: `{key}`.\n"
     )

@@ -2,7 +2,7 @@
 
 A prediction has nothing of the held-out trial but what its own force tells before anything moves: its solution's pCa
 shift and its force offset (`fit.calibration`). Measurement errors that a study shares (time shift, length gain) are
-taken as the study has them where held-out trials were recorded as the shown ones were, and have no part elsewhere.
+taken as the study has them where held-out trials were recorded as the training ones were, and have no part elsewhere.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from xb_muscle_ros.trials.trial import Trial
 
 Array = npt.NDArray[np.float64]
 
-# Faults that a trial's force tells before anything moves.
+# Artefacts that a trial's force tells before anything moves.
 _OWN = ("pca_shift", "force_offset")
-# Faults of a whole set of recordings; of run-down the order of all trials would have to be known.
+# Artefacts of a whole set of recordings; of run-down the order of all trials would have to be known.
 _SHARED = ("length_gain", "time_shift", "transducer_lag")
 # What is averaged at the end of a trial, s.
 END_S = 0.5
@@ -65,7 +65,7 @@ def shared_errors(d: Diagnosis, fibre: str, model: str) -> dict[str, float]:
 
 
 def predictions(
-    d: Diagnosis, folder: Path, bases: Sequence[Fibre], heldout: Mapping[str, Sequence[Trial]], alike: bool
+    d: Diagnosis, folder: Path, bases: Sequence[Fibre], held_out: Mapping[str, Sequence[Trial]], alike: bool
 ) -> tuple[list[dict[str, Any]], dict[str, Array]]:
     """A row for every held-out trial, and its forces.
 
@@ -73,14 +73,14 @@ def predictions(
         d: the diagnosis.
         folder: with its augmented fibre files.
         bases: fitted base of each fibre.
-        heldout: trials by what they test.
-        alike: they were recorded as the shown ones were.
+        held_out: trials by what they test.
+        alike: they were recorded as the training ones were.
 
     Returns:
         rows with RMSD (F0; None: no solution), errors of the trial's own and mean force in the last `END_S` by model;
         arrays ``p<k>_time_s``, ``p<k>_measured_f0``, ``p<k>_before_f0`` and ``p<k>_after_f0``.
     """
-    every = [(tests, trial) for tests, group in heldout.items() for trial in group]
+    every = [(tests, trial) for tests, group in held_out.items() for trial in group]
     rows: list[dict[str, Any]] = []
     arrays: dict[str, Array] = {}
     for k, (tests, given) in enumerate(every):

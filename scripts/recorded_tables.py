@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.diagnose.component import NAMED, OfFibre
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.residual import Place
 from xb_muscle_ros.diagnose.result import Diagnosis
+from xb_muscle_ros.tables import markdown
 
 _PLACES, _SETS, _COMPONENTS = 6, 8, 8
 # Components less probable than this are counted only.
 _LEAST = 0.05
-
-
-def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table."""
-    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
 
 
 def force(value_f0: float | None) -> str:
@@ -56,7 +53,7 @@ def components(d: Diagnosis) -> str:
             ]
         )  # fmt: skip
     left = len(d.components) - len(shown)
-    return table(heads, cells) + (f"\n\n{left} further candidates are less probable." if left else "")
+    return markdown(heads, cells) + (f"\n\n{left} further candidates are less probable." if left else "")
 
 
 def fibres(d: Diagnosis) -> str:
@@ -77,7 +74,7 @@ def fibres(d: Diagnosis) -> str:
                 say.NOTHING if left is None else f"{force(left[0])} → {force(left[1])}",
             ]
         )
-    return table(heads, cells)
+    return markdown(heads, cells)
 
 
 def _of_fibre(row: OfFibre) -> str:
@@ -97,13 +94,13 @@ def places(found: Sequence[Place]) -> str:
         ]
         for m in found[:_PLACES]
     ]  # fmt: skip
-    return table(["trial", "phase", "time (s)", "size", "mean, measured less model"], rows)
+    return markdown(["trial", "phase", "time (s)", "size", "mean, measured less model"], rows)
 
 
 def feature_scores(d: Diagnosis) -> str:
     """Relative SRS at conditions that no trace has."""
     rows = [[f.reading, f.conditions, str(f.count), f"{f.before:.3f}", f"{f.after:.3f}"] for f in d.feature_scores]
-    return table(["reading", "reductions", "conditions", "base", "answer"], rows)
+    return markdown(["reading", "reductions", "conditions", "base", "answer"], rows)
 
 
 def sets(d: Diagnosis) -> str:
@@ -117,10 +114,17 @@ def sets(d: Diagnosis) -> str:
         ]
         for s in rows
     ]  # fmt: skip
-    return table(["set", "probability", "log evidence", "RMSD", "fitted"], cells)
+    return markdown(["set", "probability", "log evidence", "RMSD", "fitted"], cells)
 
 
-def heldout(rows: Sequence[Mapping[str, Any]]) -> str:
+def predicted_rows(folder: Path) -> list[dict[str, Any]]:
+    """Rows of the held-out trials in ``predictions.json``, also of its former formats."""
+    tree = json.loads((folder / "predictions.json").read_text(encoding="utf-8"))
+    rows: list[dict[str, Any]] = next(tree[key] for key in ("held_out", "heldout", "concealed") if key in tree)
+    return rows
+
+
+def held_out(rows: Sequence[Mapping[str, Any]]) -> str:
     """How held-out trials are predicted."""
     answered = any("after" in row["rmsd_f0"] for row in rows)
     heads = ["tests", "trial", "base"]
@@ -140,7 +144,7 @@ def heldout(rows: Sequence[Mapping[str, Any]]) -> str:
         line += [" / ".join(map(force, offset))]
         line += [" / ".join(force(row["end_f0"].get(m)) for m in ("measured", *models))]
         cells.append(line)
-    return table(heads, [*cells, _total(rows, models, len(heads))])
+    return markdown(heads, [*cells, _total(rows, models, len(heads))])
 
 
 def _total(rows: Sequence[Mapping[str, Any]], models: Sequence[str], width: int) -> list[str]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
+import json
 import os
 import re
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from xb_muscle_ros.errors import UserError
 
@@ -42,6 +45,28 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file by way of `replaced`."""
     with replaced(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, tree: Any) -> None:
+    """Write plain data as JSON, and dataclasses as objects: what their ``as_row`` says, else their fields.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+    write_text(path, json.dumps(tree, indent=1, ensure_ascii=False, allow_nan=False, default=_fields) + "\n")
+
+
+def plain_tree(tree: Any) -> Any:
+    """What `write_json` writes, as mappings, lists, texts and numbers."""
+    return json.loads(json.dumps(tree, allow_nan=False, default=_fields))
+
+
+def _fields(value: Any) -> Any:
+    if hasattr(value, "as_row"):
+        return value.as_row()
+    if not dataclasses.is_dataclass(value) or isinstance(value, type):
+        raise TypeError(f"{type(value).__name__} has no form in JSON")
+    return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
 
 
 def matching(folder: Path, *patterns: str) -> list[Path]:

@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from xb_muscle_ros.bench.soak import Balance, random_stretches, soak
+from xb_muscle_ros.bench.balance import Balance
+from xb_muscle_ros.bench.random_stretches import random_stretches
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
@@ -57,6 +58,9 @@ def test_stretches_are_random_but_repeat() -> None:
 
 def test_a_short_soak() -> None:
     """Force in balance to 1e-9 F0, as over ten million ticks."""
+    pytest.importorskip("rclpy", reason="ROS 2 is not installed")
+    from xb_muscle_ros.bench.soak import soak
+
     found = soak(load_fibre("18Dec2017a"), 4000)
     assert found.ticks == 4000
     assert found.worst_balance_f0 < 1e-9

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.cli import import_command
+from xb_muscle_ros.cli.main import build_parser
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.bags import find_bags, read_trial
 from xb_muscle_ros.trials.readers.registry import READERS
@@ -22,9 +22,7 @@ OPTIONS = [
 
 
 def run(*arguments: str | Path) -> int:
-    parser = argparse.ArgumentParser("xb_muscle")
-    import_command.add(parser.add_subparsers())
-    args = parser.parse_args(["import", *map(str, arguments)])
+    args = build_parser().parse_args(["import", *map(str, arguments)])
     code: int = args.run(args)
     return code
 

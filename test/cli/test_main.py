@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from xb_muscle_ros.cli.main import main
+from xb_muscle_ros.cli.main import COMMANDS, build_parser, main
 
 
 @pytest.fixture(scope="module")
@@ -161,10 +161,19 @@ def test_ctrl_c_inside_a_compiler_is_an_interruption(
                 finally:
                     raise RuntimeError("no compiled object yet")
 
-        monkeypatch.setattr(module, "parser", Parser)
+        monkeypatch.setattr(module, "build_parser", Parser)
         return module.main([])
 
     assert run(KeyboardInterrupt) == 130
     assert capsys.readouterr().err == "xb_muscle: interrupted\n"
     with pytest.raises(RuntimeError):
         run(ValueError)
+
+
+def test_every_command_is_in_the_full_parser() -> None:
+    (commands,) = (action.choices for action in build_parser()._actions if isinstance(action.choices, dict))
+    assert list(commands) == list(COMMANDS)
+    for name, command in commands.items():
+        assert command.description, name
+        for action in command._actions:
+            assert action.help or action.dest == "step", (name, action.dest)

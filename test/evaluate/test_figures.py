@@ -13,6 +13,7 @@ import pytest
 
 from xb_muscle_ros.evaluate.figures import force as force_figure
 from xb_muscle_ros.evaluate.figures import srs, surfaces
+from xb_muscle_ros.evaluate.force_scores import ForceScores, PairedTests, Spread
 from xb_muscle_ros.evaluate.sections import srs_section
 from xb_muscle_ros.evaluate.sets import gather
 from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable
@@ -69,9 +70,9 @@ def test_a_model_has_one_name_in_all_figures(seen: list[Any], tmp_path: Path) ->
     assert srs.draw_srs(tmp_path / "srs.png", data, tables, section)
     assert names <= seen[0]["legend"]
     assert names <= seen[0]["ticks"]
-    held = {"mean": 0.1, "sd": None, "fibres": {"a": 0.1}, "trials": 1}
+    held = Spread(0.1, None, {"a": 0.1}, 1)
     overall = {name: {"whole": held, "conditioning": None, "test": held} for name in MODELS}
-    force = {"overall": overall, "slices": {}, "paired_t_tests": {"comparisons": []}}
+    force = ForceScores(overall, {}, {}, PairedTests(0.05, []))
     force_figure.draw_force(tmp_path / "force.png", force)
     assert names <= seen[1]["ticks"]
     with warnings.catch_warnings():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -83,7 +85,7 @@ def test_aic_is_relative_where_conditions_are_the_same() -> None:
     assert shown["hill_se"] == 0.0
     assert shown["2state"] == pytest.approx(2 * 3 + 84 * np.log(0.01 / 0.04))
     assert relative_aic(scores, AicReference(None, ""))["2state"] == scores["2state"].aic
-    fewer = {**scores, "2state": scores["2state"]._replace(conditions={"large": 6, "small": 77, "all": 83})}
+    fewer = {**scores, "2state": replace(scores["2state"], conditions={"large": 6, "small": 77, "all": 83})}
     assert relative_aic(fewer, AicReference("hill_se", ""))["2state"] is None
 
 
@@ -116,18 +118,18 @@ def test_agreement_with_values_ranges_and_bounds(lower: float, upper: float, agr
     models = gather(["18Dec2017a"], ["3state_coop"], None)
     reported = Reported("srs_rmsd.large", "3state_coop", lower, upper, "made up")
     (entry,) = compare([source], DATA, models, [reported])
-    assert entry["agrees"]["ours"]["text"] is agrees
-    assert ("not reproduced" in entry["remark"]) is not agrees
+    assert entry.agrees["ours"]["text"] is agrees
+    assert ("not reproduced" in entry.remark) is not agrees
 
 
 def test_what_cannot_be_had_is_said() -> None:
     models = gather(["18Dec2017a"], ["hill", "3state_coop"], None)
     source = Source("ours", {"hill": table(1.0), "3state_coop": table(0.8)}, {})
-    by = {(e["quantity"], e["model"]): e for e in compare([source], DATA, models)}
-    assert "set borrowed from hill_se" in by["srs_rmsd.large", "hill"]["remark"]
-    assert by["srs_rmsd.small", "2state_coop"]["remark"] == "no parameter set released for this model"
-    assert by["srs_rmsd.small", "2state_coop"]["agrees"] == {"ours": {"text": None, "released": None}}
-    assert "does not redevelop" in by["k_tr", "3state_coop"]["remark"]
+    by = {(e.quantity, e.model): e for e in compare([source], DATA, models)}
+    assert "set borrowed from hill_se" in by["srs_rmsd.large", "hill"].remark
+    assert by["srs_rmsd.small", "2state_coop"].remark == "no parameter set released for this model"
+    assert by["srs_rmsd.small", "2state_coop"].agrees == {"ours": {"text": None, "released": None}}
+    assert "does not redevelop" in by["k_tr", "3state_coop"].remark
 
 
 def test_the_papers_numbers_are_written_as_it_has_them() -> None:
@@ -142,4 +144,4 @@ def test_all_readings_are_listed() -> None:
     models = gather(["18Dec2017a"], ["3state_coop"], None)
     found = readings_table([Source("ours", {"3state_coop": table(1.0)}, {})], DATA, models, ALL_READINGS)
     assert len(found) == len(ALL_READINGS) == 32
-    assert found[0]["rmsd_large"] == pytest.approx(0.2)
+    assert found[0].scores.rmsd["large"] == pytest.approx(0.2)

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.evaluate.results import Request
+from xb_muscle_ros.evaluate.request import Request
 from xb_muscle_ros.evaluate.run import JOURNAL, evaluate
 from xb_muscle_ros.evaluate.writing import draw_figures, write, write_tables
 from xb_muscle_ros.models.fibre_file import load_fibre
@@ -32,20 +32,8 @@ HERE = Options(processes=0, quiet=True)
 
 
 def request(out: Path, *bags: Path, **changes: Any) -> Request:
-    given: dict[str, Any] = {
-        "bags": tuple(map(str, bags)),
-        "fibres": (),
-        "models": ("3state_coop", "2state"),
-        "method": None,
-        "settle_s": None,
-        "measured_only": False,
-        "skip_bad": False,
-        "empirical": None,
-        "golden": None,
-        "out": out,
-        "work": HERE,
-    }
-    return Request(**{**given, **changes})
+    given: dict[str, Any] = {"bags": tuple(map(str, bags)), "models": ("3state_coop", "2state"), "work": HERE}
+    return Request(out, **{**given, **changes})
 
 
 def run(made: Request) -> dict[str, Any]:
@@ -86,7 +74,8 @@ def test_conditions_that_are_not_the_papers(make: Maker, tmp_path: Path) -> None
     paths = [make(pca=pca, amplitude_l0=a, recovery_s=0.07) for pca in (4.5, 6.1) for a in (0.01, 0.03)]
     made = request(tmp_path / "out", *paths)
     results = evaluate(made)
-    assert results.sections["srs"]["models"]["2state"]["text"]["conditions"]["all"] == 0
+    assert results.sections.srs is not None
+    assert results.sections.srs.models["2state"].under["text"].conditions["all"] == 0
     assert "force_rmsd.png" in {path.name for path in write(made, results)}
     assert not list((tmp_path / "out").glob("relative_srs.p*"))
     assert [line for line in results.warnings if line.startswith("relative_srs.png is not drawn: no trial with 3.83")]
@@ -212,8 +201,8 @@ def test_the_papers_grid_to_files(tmp_path: Path) -> None:
     table = small_table(tmp_path)
     made = request(tmp_path / "out", empirical=table, golden=_golden(tmp_path, table))
     results = evaluate(made)
-    found = results.sections
     write_tables(made.out, results)
+    found = json.loads((made.out / "evaluate.json").read_text())
     drawn = {path.name for path in draw_figures(made.out, results)}
     assert [each["model"] for each in found["sets"]] == ["2state", "3state_coop"]
     # Fibres that were measured and have a file.
@@ -335,8 +324,12 @@ def test_a_fibre_nobody_knows_is_one_line_however_many_bags(make: Maker, tmp_pat
 def test_the_one_file_given_serves_a_fibre_nobody_knows(make: Maker, tmp_path: Path) -> None:
     folder = mine(make, 2)
     results = evaluate(request(tmp_path / "out", folder, fibres=("18Dec2017a",), models=("2state",)))
-    assert results.sections["force_rmsd"]["overall"]["2state"]["whole"]["mean"] == pytest.approx(0.01, abs=1e-6)
-    assert results.sections["trials"]["fibres"] == ["mine"]
+    assert results.sections.force_rmsd is not None
+    whole = results.sections.force_rmsd.overall["2state"]["whole"]
+    assert whole is not None
+    assert whole.mean == pytest.approx(0.01, abs=1e-6)
+    assert results.trials is not None
+    assert results.trials.fibres == ["mine"]
     served = [line for line in results.warnings if "mine" in line and not line.startswith("force-pCa curve")]
     assert served == ["trials of fibre mine are compared with parameters of 18Dec2017a, the one file given"]
 

@@ -12,8 +12,8 @@ from xb_muscle_ros.evaluate.bags import answer
 from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.replay.report import record
-from xb_muscle_ros.scores.isometric import isometric_force
 from xb_muscle_ros.scores.noise.windows import isometric_window
+from xb_muscle_ros.scores.readout import isometric_force
 from xb_muscle_ros.scores.steady import steady_part
 from xb_muscle_ros.trials.importing import Imported, import_recordings
 from xb_muscle_ros.trials.readers.mapping import load_mapping
@@ -55,8 +55,8 @@ def test_all_commands_take_the_same_force() -> None:
     expected = isometric_force(trial, TIME, trial.measured_f0).value
     assert expected is not None
     simulated = Simulated(TIME, trial.force_n, TIME, TIME, dict.fromkeys(MOMENTS, TIME))
-    assert record(trial, simulated, load_fibre("18Dec2017a"))["measured_isometric_force_f0"] == expected
-    assert answer(trial, TIME, trial.measured_f0)["isometric_f0"] == expected
+    assert record(trial, simulated, load_fibre("18Dec2017a")).measured["isometric_f0"].value == expected
+    assert answer(trial, TIME, trial.measured_f0)["isometric_f0"].value == expected
     (fitted,) = fit_trials([trial], [False], whole=True)
     assert float(np.mean(fitted.measured_f0[fitted.steady])) == expected
     # The noise of a study is taken there too: a rise is none.

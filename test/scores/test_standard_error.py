@@ -11,12 +11,12 @@ from scipy.signal import lfilter
 
 from xb_muscle_ros.evaluate.trials import _mean_in_cells
 from xb_muscle_ros.scores.enhancement import Enhancement, Side, enhancement
-from xb_muscle_ros.scores.estimate import Estimate, error_text, mark, notes_of, unsound
-from xb_muscle_ros.scores.isometric import isometric_force
+from xb_muscle_ros.scores.estimate import Estimate, notes_of
 from xb_muscle_ros.scores.noise.hum import hum
-from xb_muscle_ros.scores.readout import read_off, read_off_measured
+from xb_muscle_ros.scores.readout import isometric_force, read_off, read_off_measured
 from xb_muscle_ros.scores.redevelopment import Redevelopment, redevelopment
 from xb_muscle_ros.scores.standard_error import force_noise
+from xb_muscle_ros.tables import error_text, unsound, with_error
 from xb_muscle_ros.trials.trial import Array, Phase, Trial, TrialFacts
 
 SRS, LEVEL = 20.0, 0.4
@@ -177,7 +177,8 @@ def test_slow_ramp_and_large_hum_are_marked() -> None:
 
 def test_text_of_errors_and_marks() -> None:
     assert [error_text(se) for se in (None, np.nan, 15.2, 0.213, 0.00012)] == ["", "", " ± 15", " ± 0.21", " ± 0.00012"]
-    assert (mark(2.0, 5.1), mark(-9.0, 5.1), mark(2.0, None), mark(None, 1.0)) == ("*", "", "", "")
+    told = [with_error(*each, ".0f") for each in ((2.0, 5.1), (-9.0, 5.1), (2.0, None), (None, 1.0))]
+    assert told == ["2 ± 5.1*", "-9 ± 5.1", "2", "–"]
 
 
 def test_notes_of_one_kind_are_one_line() -> None:

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from xb_muscle_ros.scores.aic import aic
-from xb_muscle_ros.scores.paired import bonferroni_threshold, paired_t
+from xb_muscle_ros.scores.statistics import aic, bonferroni_threshold, paired_t
 
 
 def test_aic_by_hand() -> None:

@@ -12,8 +12,10 @@ import pytest
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.report import add_relative_stiffness, record, table
+from xb_muscle_ros.replay.report import RELATIVE, Record, record, table, with_relative_srs
 from xb_muscle_ros.replay.run import replay, write_results
+from xb_muscle_ros.scores.estimate import Estimate
+from xb_muscle_ros.scores.readout import ISOMETRIC, SRS_TEST
 from xb_muscle_ros.simulation.offline import calcium_per_step, simulate_trial
 from xb_muscle_ros.trials.bags import read_simulated, read_trial, write_trial
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
@@ -79,7 +81,7 @@ def test_a_perfect_model_has_no_error(muscle: Muscle) -> None:
     trial = StretchShortenStretch(0.0383, 0.01).trial("18Dec2017a", 6.1)
     simulated = simulate_trial(muscle, trial)
     trial = replace(trial, force_time_s=trial.time_s, force_n=simulated.force_n)
-    entry = record(trial, simulated, muscle.fibre)
+    entry = record(trial, simulated, muscle.fibre).as_row()
     assert entry["rmsd_f0"] == {"whole": 0.0, "conditioning": 0.0, "test": 0.0}
     assert entry["srs_test"] == entry["measured_srs_test"]
     assert entry["srs_conditioning"] == entry["measured_srs_conditioning"] > entry["srs_test"]
@@ -88,7 +90,7 @@ def test_a_perfect_model_has_no_error(muscle: Muscle) -> None:
 
 def test_absent_phases_and_measurements_are_null(muscle: Muscle) -> None:
     trial = StretchShortenStretch(0.0, 0.01).trial("18Dec2017a", 6.1)
-    entry = record(trial, simulate_trial(muscle, trial), muscle.fibre)
+    entry = record(trial, simulate_trial(muscle, trial), muscle.fibre).as_row()
     assert entry["rmsd_f0"] == {"whole": None, "conditioning": None, "test": None}
     assert entry["srs_conditioning"] is None
     assert entry["measured_srs_test"] is None
@@ -96,18 +98,18 @@ def test_absent_phases_and_measurements_are_null(muscle: Muscle) -> None:
 
 
 def test_relative_srs_needs_a_reference_of_the_same_pca() -> None:
-    measured = {"measured_srs_test": 6.0, "measured_srs_test_se": 0.3, "notes": []}
-    base = {"fibre": "f", "srs_test": 8.0, "recovery_s": 0.1, **measured}
+    def of(pca: float, amplitude_l0: float, simulated: float, measured: Estimate) -> Record:
+        found = ({SRS_TEST: each, RELATIVE: Estimate(None)} for each in (Estimate(simulated), measured))
+        return Record("t", "f", "m", "", pca, amplitude_l0, 0.1, {}, *found)
+
     records = [
-        {**base, "pca": 6.1, "amplitude_l0": 0.0383},
-        {**base, "pca": 6.1, "amplitude_l0": 0.0, "srs_test": 10.0, "measured_srs_test": None},
-        {**base, "pca": 6.3, "amplitude_l0": 0.0383},
+        of(6.1, 0.0383, 8.0, Estimate(6.0, 0.3)),
+        of(6.1, 0.0, 10.0, Estimate(None, 0.3)),
+        of(6.3, 0.0383, 8.0, Estimate(6.0, 0.3)),
     ]
-    for entry in records:
-        entry["relative_srs"] = entry["measured_relative_srs"] = None
-    add_relative_stiffness(records)
-    assert [r["relative_srs"] for r in records] == [0.8, 1.0, None]
-    assert [r["measured_relative_srs"] for r in records] == [None, None, None]
+    found = with_relative_srs(records)
+    assert [r.simulated[RELATIVE].value for r in found] == [0.8, 1.0, None]
+    assert [r.measured[RELATIVE].value for r in found] == [None, None, None]
 
 
 def test_files_of_a_replay(tmp_path: Path) -> None:
@@ -144,7 +146,7 @@ def test_recordings_of_18dec2017a(shared_data: Path, repo_root: Path) -> None:
     mapping = build_mapping(load_mapping(where), "test")
     files = sorted((shared_data / "recordings/rat_soleus_18Dec2017a").glob("amp*.csv"))
     results = replay([read_csv(f, mapping) for f in files], load_fibre("18Dec2017a"))
-    whole = {r["pca"]: r["rmsd_f0"]["whole"] for r in results.records}
+    whole = {r.pca: r.rmsd_f0["whole"] for r in results.records}
     assert whole == pytest.approx({4.5: 0.066, 6.1: 0.059, 6.3: 0.086, 6.6: 0.024, 9.0: 0.0019}, abs=0.002)
 
 
@@ -153,14 +155,15 @@ def test_measured_numbers_come_with_errors_and_a_mark(muscle: Muscle) -> None:
     protocol = StretchShortenStretch(0.0, 0.01, lead_s=0.5).trial("18Dec2017a", 9.0)
     simulated = simulate_trial(muscle, protocol)
     loud = simulated.force_n + 0.02 * np.sin(2.0 * np.pi * 50.0 * protocol.time_s)
-    entry = record(replace(protocol, force_time_s=protocol.time_s, force_n=loud), simulated, muscle.fibre)
+    found = record(replace(protocol, force_time_s=protocol.time_s, force_n=loud), simulated, muscle.fibre)
+    entry = found.as_row()
     assert entry["measured_srs_test_se"] > abs(entry["measured_srs_test"] - entry["srs_test"]) / 1.5
     assert "srs_test_se" not in entry
-    text = table([{**entry, "measured_srs_test": 2.0, "measured_srs_test_se": 5.1}], "title")
+    text = table([replace(found, measured={**found.measured, SRS_TEST: Estimate(2.0, 5.1)})], "title")
     assert "2.0 ± 5.1*" in text
     assert "* standard error as large as the value or larger" in text
     slow = replace(protocol, force_time_s=protocol.time_s[::6], force_n=loud[::6])
     sparse = record(slow, simulated, muscle.fibre)
-    assert sparse["measured_srs_test"] is None
-    assert sparse["measured_isometric_force_f0_se"] > 0.0
+    assert sparse.measured[SRS_TEST].value is None
+    assert (sparse.measured[ISOMETRIC].se or 0.0) > 0.0
     assert "SRS of the test stretch, measured, of trial" in table([sparse], "title")

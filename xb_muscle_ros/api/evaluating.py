@@ -12,12 +12,14 @@ from xb_muscle_ros.api.inputs import FibreLike, TrialsLike, kept, known_of, path
 from xb_muscle_ros.api.tables import dataframe, drawn
 from xb_muscle_ros.api.telling import Lines, Tell
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.evaluate.report import comparison_table, force_table, readings_with_conditions, srs_table_text
-from xb_muscle_ros.evaluate.results import Request, Results
+from xb_muscle_ros.evaluate.csv_rows import relative_rows, trial_rows
+from xb_muscle_ros.evaluate.force_scores import force_rows
+from xb_muscle_ros.evaluate.report import comparison_table, force_table, srs_table_text
+from xb_muscle_ros.evaluate.request import Request
+from xb_muscle_ros.evaluate.results import Results
 from xb_muscle_ros.evaluate.run import evaluate as evaluated
-from xb_muscle_ros.evaluate.sections import force_rows, relative_rows, trial_rows
 from xb_muscle_ros.evaluate.writing import draw_figures, older_results, write
-from xb_muscle_ros.files import refuse_older
+from xb_muscle_ros.files import plain_tree, refuse_older
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.fibre_writing import write_fibre
 from xb_muscle_ros.models.registry import METHODS, split_set
@@ -46,25 +48,24 @@ class EvaluationResult:
     request: Request
 
     def __repr__(self) -> str:
-        models = ", ".join(each.name for each in self.results.models) or "no models"
+        models = ", ".join(each.model for each in self.results.sections.sets) or "no models"
         trials = self.found.get("trials", {}).get("used", 0)
         return f"EvaluationResult({trials} trials; {models})"
 
     def __str__(self) -> str:
         """The tables that ``xb_muscle evaluate`` prints."""
         found, parts = self.results.sections, []
-        if found.get("force_rmsd", {}).get("overall"):
-            parts.append(f"force RMSD, fibre means ± s.d.\n\n{force_table(found['force_rmsd'])}\n")
-        if "paper" in found:
+        if found.force_rmsd is not None and found.force_rmsd.overall:
+            parts.append(f"force RMSD, fibre means ± s.d.\n\n{force_table(found.force_rmsd)}\n")
+        if found.paper is not None:
             head = "beside the paper (= to 0.01 or within its bound, ≠ not)"
-            parts.append(f"{head}\n\n{comparison_table(found['paper'])}\n")
-        if "srs" in found:
-            shown = readings_with_conditions(found["srs"])
-            for reading in shown:
+            parts.append(f"{head}\n\n{comparison_table(found.paper)}\n")
+        if found.srs is not None:
+            for reading in found.srs.shown:
                 head = f"RMSD of relative SRS, reading '{reading}'"
-                parts.append(f"{head}\n\n{srs_table_text(found['srs'], reading)}\n")
-            if shown and found["srs"]["aic_note"]:
-                parts.append(found["srs"]["aic_note"] + "\n")
+                parts.append(f"{head}\n\n{srs_table_text(found.srs, reading)}\n")
+            if found.srs.shown and found.srs.aic_note:
+                parts.append(found.srs.aic_note + "\n")
         return "\n".join(parts)
 
     def to_dataframe(self, table: str = "trials") -> pd.DataFrame:
@@ -76,11 +77,11 @@ class EvaluationResult:
         Raises:
             UserError: pandas is not there, or the evaluation has no such table.
         """
-        results, found = self.results, self.results.sections.get("force_rmsd", {})
+        results, found = self.results, self.results.sections.force_rmsd
         rows: dict[str, Any] = {}
         if results.trials is not None:
             rows["trials"] = lambda: trial_rows(results.trials)
-        if found.get("overall"):
+        if found is not None and found.overall:
             rows["force_rmsd"] = lambda: force_rows(found)
         if results.data is not None:
             rows["relative_srs"] = lambda: relative_rows(results.tables, results.data)
@@ -214,7 +215,7 @@ def evaluate(
         )
         results = evaluated(request, lines.say)
     lines.say(*results.warnings)
-    return EvaluationResult(results.sections, tuple(lines), results, request)
+    return EvaluationResult(plain_tree(results.sections), tuple(lines), results, request)
 
 
 def _as_bags(trials: Sequence[Trial], folder: Path) -> tuple[Path, ...]:

@@ -12,7 +12,7 @@ from xb_muscle_ros.api.inputs import trials_of as read
 from xb_muscle_ros.api.tables import dataframe, drawn
 from xb_muscle_ros.api.telling import Lines, Tell
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import matching, refuse_older
+from xb_muscle_ros.files import matching, refuse_older, write_json
 from xb_muscle_ros.fit.coordinates import (
     Choice,
     fault_coordinates,
@@ -24,7 +24,7 @@ from xb_muscle_ros.fit.data import FitTrial, fit_trials
 from xb_muscle_ros.fit.features import F0_ANCHOR, Feature, measured
 from xb_muscle_ros.fit.ordinary import shown_by
 from xb_muscle_ros.fit.problem import Problem
-from xb_muscle_ros.fit.report import as_json, write_fitted, write_json
+from xb_muscle_ros.fit.report import as_json, write_fitted
 from xb_muscle_ros.fit.run import Fitted, Settings
 from xb_muscle_ros.fit.run import fit as fitted_to
 from xb_muscle_ros.fit.split import held_out

@@ -50,7 +50,7 @@ class ReplayResult(Replay):
     @property
     def rows(self) -> tuple[dict[str, Any], ...]:
         """The records as ``replay.json`` holds them, a mapping for each trial."""
-        return tuple(self.records)
+        return tuple(record.as_row() for record in self.records)
 
     def to_dataframe(self, samples_of_trials: bool = False) -> pd.DataFrame:
         """A row for each trial; columns as the keys of ``replay.json``.

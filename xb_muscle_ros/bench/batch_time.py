@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from xb_muscle_ros.bench.measure import Figure, timed
+from xb_muscle_ros.bench.measure import Figure, Setting, timed
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre, load_fibre
 
@@ -31,8 +31,9 @@ def many(count: int, smoothing: float = 100.0, method: str = "gaussian", bins: f
     return made
 
 
-def figures() -> list[Figure]:
+def study(setting: Setting) -> list[Figure]:
     """Time of a 1 ms tick of 100 moving fibres, its force error, and the memory of 1,000 fibres on a grid."""
+    del setting  # always of the released fibres
     made = []
     for smoothing, kind in ((100.0, "smooth"), (0.0, "exact")):
         batch = MuscleBatch(many(100, smoothing))
@@ -42,21 +43,21 @@ def figures() -> list[Figure]:
         for k in range(20):
             states = batch.step(states, np.full(100, 4.545e-4 * (k + 1)), calcium, _TICK_S)
         length = np.full(100, 4.545e-4 * 21)
-        seconds, spread = timed(functools.partial(batch.step, states, length, calcium, _TICK_S), 2001)
-        once = batch.outputs(batch.step(states, length, calcium, _TICK_S))["force_f0"]
+        work = functools.partial(batch.step, states, length, calcium, _TICK_S)
+        once = batch.outputs(work())["force_f0"]
         fine = states
         for k in range(32):
             part = states[:, -3] + (length - states[:, -3]) * ((k + 1) / 32)
             fine = batch.step(fine, part, calcium, _TICK_S / 32)
         error = 100.0 * float(np.abs(once - batch.outputs(fine)["force_f0"]).max())
-        name = f"100 fibres, one 1 ms tick, {kind}"
-        made.append(Figure(name, seconds * 1e6, "µs", spread * 1e6, f"largest force error {error:.2g} % F0"))
+        what = f"largest force error {error:.2g} % F0"
+        made.append(timed(f"100 fibres, one 1 ms tick, {kind}", work, 2001, "µs", what))
     command = [sys.executable, "-c", "from xb_muscle_ros.bench.batch_time import large; print(large())"]
     # Once to compile, which takes memory of its own, once to measure.
     subprocess.run(command, check=True, capture_output=True)
     peak = float(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
     what = "whole process; 300 MB were asked for"
-    made.append(Figure(f"memory of {_LARGE} fibres, {_LARGE_BINS} bins each", peak, "MB", None, what))
+    made.append(Figure(f"memory of {_LARGE} fibres, {_LARGE_BINS} bins each", peak, "MB", what))
     return made
 
 

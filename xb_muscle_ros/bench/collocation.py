@@ -80,8 +80,8 @@ def collocate(problem: Problem, limited_memory: bool = False, limit_s: float = 3
     """Minimise the squared differences between force and data over parameters and states at once.
 
     Args:
-        problem: trials with force at every sample, and model parameters as coordinates. Priors, weights and faults of
-            the measurement are left out.
+        problem: trials with force at every sample, and model parameters as coordinates. Priors, weights and
+            measurement artefacts are left out.
         limited_memory: second derivatives by limited memory (L-BFGS) instead of exact ones.
         limit_s: when to stop IPOPT, s.
 

@@ -7,23 +7,20 @@ against characteristics with 10,000 bins over ±15.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+import functools
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from xb_muscle_ros.bench.measure import Figure
+from xb_muscle_ros.bench.measure import Figure, Setting, timed
+from xb_muscle_ros.bench.papers_trial import PapersTrial
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.models.muscle import Array, Muscle
+from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.registry import compose
 from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, THIRD, figure, save
-from xb_muscle_ros.trials.protocol import StretchShortenStretch
+from xb_muscle_ros.progress import Progress
 
-_DURATION_S = 2.34
-_STEP_S = 1e-4
-_PCA = 6.1
 # Right-hand sides in a step: the moments' stepper and the grids' both take two.
 _EVALUATIONS = 2
 REFERENCE_BINS = 10000
@@ -72,73 +69,47 @@ def _fibre(fibre: Fibre, method: str, bins: int, strain_range: float) -> Fibre:
     return replace(fibre, method=method, values=values)
 
 
-class Study:
-    """The condition, and the reference that errors are taken against."""
+class Condition:
+    """The paper's trial, and the reference that errors are taken against."""
 
     def __init__(self, fibre: Fibre, repeats: int = 5, reference_bins: int = REFERENCE_BINS) -> None:
         """Compute the reference (a few seconds)."""
-        self.fibre = fibre
-        self._repeats = repeats
-        protocol = StretchShortenStretch(0.0383, 0.001, lead_s=2.0, hold_s=0.0)
-        end = float(protocol.corners()[0][-1])
-        protocol = replace(protocol, hold_s=max(0.0, _DURATION_S - end))
-        self.corner_s, self.corner_l0 = protocol.corners()
-        self.time_s = np.arange(round(_DURATION_S / _STEP_S) + 1) * _STEP_S
-        self.length = np.interp(self.time_s, self.corner_s, self.corner_l0)
-        self.calcium = 10.0 ** (6.0 - _PCA)
-        self.held = np.full(self.time_s.size, self.calcium)
-        self.reference = self._force(Muscle(_fibre(fibre, "characteristics", reference_bins, 15.0)))
+        self._fibre, self._repeats = fibre, repeats
+        reference = PapersTrial(Muscle(_fibre(fibre, "characteristics", reference_bins, 15.0)))
+        self._reference = reference.force_f0(reference.fixed())
 
-    def _force(self, muscle: Muscle) -> Array:
-        start = muscle.settle(0.0, self.calcium)
-        states = muscle.run(start, np.diff(self.time_s), self.length, self.held, every=10)
-        return muscle.outputs_of(states)["force_f0"]
+    def point(self, method: str, bins: int, strain_range: float, series: str, tolerance: float | None = None) -> Point:
+        """Measure a method with steps of 1e-4 s, or with variable steps of a tolerance."""
+        trial = PapersTrial(Muscle(_fibre(self._fibre, method, bins, strain_range)))
+        work = trial.fixed if tolerance is None else functools.partial(trial.variable, tolerance)
+        found = work()
+        error = float(np.sqrt(np.mean((trial.force_f0(found) - self._reference) ** 2)))
+        repeats = self._repeats * (1 if tolerance is None else 4)
+        return Point(
+            method, bins, strain_range, series, _EVALUATIONS * found[1], timed("", work, repeats, "s", "").value, error
+        )
 
-    def _error(self, force: Array) -> float:
-        return float(np.sqrt(np.mean((force - self.reference) ** 2)))
-
-    def point(self, method: str, bins: int, strain_range: float, series: str) -> Point:
-        """Measure a method with steps of 1e-4 s."""
-        muscle = Muscle(_fibre(self.fibre, method, bins, strain_range))
-        start = muscle.settle(0.0, self.calcium)
-        dt = np.diff(self.time_s)
-        seconds, counts = [], list[int]()
-        for _ in range(self._repeats):
-            begin = time.perf_counter()
-            states = muscle.run(start, dt, self.length, self.held, every=10, counts=counts)
-            seconds.append(time.perf_counter() - begin)
-        force = muscle.outputs_of(states)["force_f0"]
-        taken = float(np.median(seconds))
-        return Point(method, bins, strain_range, series, _EVALUATIONS * counts[-1], taken, self._error(force))
-
-    def variable(self, tolerance: float) -> Point:
-        """The Gaussian form with variable steps."""
-        muscle = Muscle(_fibre(self.fibre, "gaussian", 0, 0.0))
-        start = muscle.settle(0.0, self.calcium)
-        sample = self.time_s[::10]
-        sample = np.minimum(sample, self.corner_s[-1])
-        corner_calcium = np.full(self.corner_s.size, self.calcium)
-        seconds, counts = [], list[int]()
-        for _ in range(4 * self._repeats):
-            begin = time.perf_counter()
-            states = muscle.follow(
-                start, self.corner_s, self.corner_l0, corner_calcium, sample, tolerance, counts=counts
-            )
-            seconds.append(time.perf_counter() - begin)
-        error = self._error(muscle.outputs_of(states)["force_f0"])
-        return Point("gaussian", 0, 0.0, "variable", _EVALUATIONS * counts[-1], float(np.median(seconds)), error)
-
-    def points(self) -> Iterator[Point]:
+    def points(self) -> list[Point]:
         """All points, cheapest method first."""
-        yield self.point("gaussian", 0, 0.0, "bins")
-        for tolerance in (1e-4, 1e-6):
-            yield self.variable(tolerance)
-        for method in ("characteristics", "fixed_grid", "fixed_grid_conservative"):
-            for bins in BINS:
-                yield self.point(method, bins, 15.0, "bins")
-            for strain_range in RANGES:
-                if strain_range != 15.0:
-                    yield self.point(method, 1 + round(2.0 * strain_range / _WIDTH), strain_range, "range")
+        grids = [(bins, 15.0, "bins") for bins in BINS]
+        grids += [(1 + round(2.0 * reach / _WIDTH), reach, "range") for reach in RANGES if reach != 15.0]
+        methods = ("characteristics", "fixed_grid", "fixed_grid_conservative")
+        steps = [functools.partial(self.point, "gaussian", 0, 0.0, "bins")]
+        steps += [functools.partial(self.point, "gaussian", 0, 0.0, "variable", each) for each in (1e-4, 1e-6)]
+        steps += [functools.partial(self.point, method, *grid) for method in methods for grid in grids]
+        made = []
+        with Progress(len(steps), "cost") as progress:
+            for step in steps:
+                made.append(step())
+                progress.update()
+        return made
+
+
+def study(setting: Setting) -> list[Figure]:
+    """Measure all points and draw them."""
+    points = Condition(setting.fibre).points()
+    draw(points, setting.drawing("cost"))
+    return figures(points)
 
 
 def figures(points: list[Point]) -> list[Figure]:
@@ -151,9 +122,9 @@ def figures(points: list[Point]) -> list[Figure]:
         paper = ""
         if p.method in PAPER and (p.bins in (0, 100)) and p.strain_range in (0.0, 15.0) and not steps:
             paper = f"; paper: {1e3 * PAPER[p.method][1]:.0f} ms"
-        made.append(Figure(name, 1e3 * p.seconds, "ms", None, f"{p.evaluations} evaluations{paper}"))
+        made.append(Figure(name, 1e3 * p.seconds, "ms", f"{p.evaluations} evaluations{paper}"))
         what = f"RMS against characteristics, {REFERENCE_BINS} bins"
-        made.append(Figure(f"{name}, force error", 100.0 * p.error_f0, "% F0", None, what))
+        made.append(Figure(f"{name}, force error", 100.0 * p.error_f0, "% F0", what))
     return made
 
 
@@ -186,10 +157,11 @@ def draw(points: list[Point], path: Path) -> None:
                     if not variable:
                         time_axes.axhline(1e3 * p.seconds, color=colour, linestyle=":", linewidth=1)
                         error_axes.axhline(100.0 * p.error_f0, color=colour, linestyle=":", linewidth=1)
+                    # Of the points with variable steps one alone stands in the legend.
+                    named = "" if variable and p is not points[1] else label + ", variable steps" * variable
                     both.loglog(
-                        1e3 * p.seconds, 100.0 * p.error_f0, marker, color=colour, markersize=5,
+                        1e3 * p.seconds, 100.0 * p.error_f0, marker, color=colour, markersize=5, label=named or None,
                         markerfacecolor="none" if variable else colour,
-label=None if variable and p is not points[1] else label + ", variable steps" * variable,
                     )  # fmt: skip
             time_axes.set_ylabel(f"{title}\nTime for 2.34 s (ms)")
             error_axes.set_ylabel("Force error (% F$_0$)")
@@ -205,8 +177,3 @@ label=None if variable and p is not points[1] else label + ", variable steps" * 
         handles, labels = axes[0][2].get_legend_handles_labels()
         made.legend(handles, labels, loc="outside upper center", ncols=5, frameon=False)
         save(made, path)
-
-
-def as_records(points: list[Point]) -> list[dict[str, object]]:
-    """Points as plain records."""
-    return [asdict(p) for p in points]

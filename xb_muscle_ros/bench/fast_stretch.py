@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
-from xb_muscle_ros.bench.measure import Figure
+from xb_muscle_ros.bench.measure import Figure, Setting
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Array, Muscle
 from xb_muscle_ros.plotting.style import MODEL, SECOND, figure, save
@@ -28,13 +26,13 @@ def stretch(muscle: Muscle, speed_l0_per_s: float) -> tuple[Array, Array]:
     return states[:, -3], muscle.outputs_of(states)["force_f0"]
 
 
-def study(fibre: str, path: Path) -> list[Figure]:
+def study(setting: Setting) -> list[Figure]:
     """Draw both models at all speeds; returns their overshoot and what is left of it at the end."""
     made = []
     with figure(178.0, 65.0) as drawn:
         axes = drawn.subplots(1, len(SPEEDS_L0_PER_S), sharey=True)
         for model, label, colour, line in MODELS:
-            muscle = Muscle(load_fibre(fibre, model))
+            muscle = Muscle(load_fibre(setting.fibre.name, model))
             for one, speed in zip(axes, SPEEDS_L0_PER_S, strict=True):
                 length, force = stretch(muscle, speed)
                 one.plot(100.0 * length, force, color=colour, linestyle=line, label=label)
@@ -42,9 +40,9 @@ def study(fibre: str, path: Path) -> list[Figure]:
                 one.set_xlabel("ΔL (% L$_0$)")
                 give = float(force.max() - force[-1])
                 name = f"fast stretch, {model}, {speed:g} L0/s"
-                made.append(Figure(f"{name}, peak force", float(force.max()), "F0", None, "isometric: 1 F0"))
-                made.append(Figure(f"{name}, give after the peak", give, "F0", None, "peak less force at 10 % L0"))
+                made.append(Figure(f"{name}, peak force", float(force.max()), "F0", "isometric: 1 F0"))
+                made.append(Figure(f"{name}, give after the peak", give, "F0", "peak less force at 10 % L0"))
         axes[0].set_ylabel("Force (F$_0$)")
         axes[0].legend(frameon=False)
-        save(drawn, path)
+        save(drawn, setting.drawing("fast_stretch"))
     return made

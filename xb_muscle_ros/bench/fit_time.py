@@ -1,8 +1,8 @@
 """The paper's fit: ours beside direct collocation on the same made data, from the same starts.
 
 Two protocols (AMP 3.83 % L0 with RT 0.1 s, and the unconditioned stretch) at six pCa, force from 0.0843 s before the
-first stretch to 0.0843 s after the test stretch at 1 kHz, all parameters that the paper fitted; no priors and no faults
-of the measurement, so that both make the same sum of squares small. The data are the fibre's own force and noise as
+first stretch to 0.0843 s after the test stretch at 1 kHz, all parameters that the paper fitted; no priors and no
+measurement artefacts, so that both make the same sum of squares small. The data are the fibre's own force and noise as
 slow as that of real recordings; the starts are the released sets of the other fibres.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +19,7 @@ from types import MappingProxyType
 import numpy as np
 
 from xb_muscle_ros.bench.batch_time import FIBRES
-from xb_muscle_ros.bench.measure import Figure
+from xb_muscle_ros.bench.measure import Figure, Setting
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.coordinates import Choice, parameter_coordinates
 from xb_muscle_ros.fit.data import fit_trials
@@ -123,19 +124,17 @@ def _rms(difference: Array) -> float:
     return float(np.sqrt(np.mean(difference**2)))
 
 
-def casadi_is_there() -> bool:
-    """Whether CasADi is installed."""
-    return importlib.util.find_spec("casadi") is not None
-
-
-def figures(truth: Fibre) -> list[Figure]:
+def study(setting: Setting) -> list[Figure]:
     """One fit from each other fibre's released set by our method and, where CasADi is installed, by collocation."""
+    truth = setting.fibre
     problems = {}
     for name in FIBRES:
         if name != truth.name:
             problems[name] = made_problem(truth, load_fibre(name, truth.model, truth.method))
     methods: dict[str, Callable[[Problem], Outcome]] = {"least squares": least_squares}
-    if casadi_is_there():
+    if importlib.util.find_spec("casadi") is None:
+        Progress.write(f"xb_muscle: warning: {MISSING}", file=sys.stderr)
+    else:
         methods["collocation"] = collocation
     outcomes: dict[str, dict[str, Outcome]] = {method: {} for method in methods}
     first, *_ = problems
@@ -150,7 +149,7 @@ def figures(truth: Fibre) -> list[Figure]:
         if "collocation" in methods:
             found = collocation(problems[first], limited_memory=True)
             title = f"fit, {truth.name} from {first}, collocation, limited memory"
-            made.append(Figure(title, found.seconds, "s", None, _what(found, _errors(problems[first], found, truth))))
+            made.append(Figure(title, found.seconds, "s", _what(found, _errors(problems[first], found, truth))))
             progress.update()
     return made
 
@@ -162,13 +161,13 @@ def _figures(truth: Fibre, outcomes: dict[str, dict[str, Outcome]], problems: di
         for name, outcome in found.items():
             title = f"fit, {truth.name} from {name}, {method}"
             what = _what(outcome, _errors(problems[name], outcome, truth))
-            made.append(Figure(title, outcome.seconds, "s", None, what))
+            made.append(Figure(title, outcome.seconds, "s", what))
     for method, found in outcomes.items():
         there = sum(outcome.rmsd_f0 < 1.01 * best for outcome in found.values())
         low, middle, high = np.percentile([outcome.seconds for outcome in found.values()], [25, 50, 75])
         longest = max(outcome.seconds for outcome in found.values())
         what = f"{there} of {len(found)} starts end at the best point; longest {longest:.1f} s; {_ASKED}"
-        made.append(Figure(f"fit, {truth.name}, {method}, median", middle, "s", (high - low) / 2.0, what))
+        made.append(Figure(f"fit, {truth.name}, {method}, median", middle, "s", what, (high - low) / 2.0))
     return made
 
 

@@ -6,6 +6,7 @@ import ctypes
 import shutil
 import subprocess
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from xb_muscle_ros.bench.c_code import c_text
-from xb_muscle_ros.bench.measure import Figure, timed
+from xb_muscle_ros.bench.measure import Figure, Setting, smooth_and_exact, timed
 from xb_muscle_ros.models.muscle import Array, Muscle
 from xb_muscle_ros.models.registry import compose
 
@@ -33,6 +34,11 @@ void loop(const double *z0, double velocity, double calcium, const double *p, do
 """
 
 
+def study(setting: Setting) -> list[Figure]:
+    """Of a fibre's model, smooth and exact."""
+    return [figure for muscle in smooth_and_exact(setting.fibre) for figure in figures(muscle)]
+
+
 def figures(muscle: Muscle, pca: float = 6.1) -> list[Figure]:
     """Time per evaluation at an isometric state in Numba and, where a C compiler is there, in C."""
     smooth = muscle.fibre.values["smoothing"] > 0.0
@@ -40,16 +46,15 @@ def figures(muscle: Muscle, pca: float = 6.1) -> list[Figure]:
     state = muscle.settle(0.0, calcium)
     z = np.concatenate([state[:-3], [0.0]])
     name = f"right-hand side, {muscle.fibre.model}, {'smooth' if smooth else 'exact'}"
-    ours, spread = timed(_numba_loop(muscle, z, calcium), _REPEATS, _CALLS)
     c = _c_loop(muscle, z, calcium)
-    paper = "paper: 17 µs (MATLAB)"
+    ours = timed(name, _numba_loop(muscle, z, calcium), _REPEATS, "ns", "paper: 17 µs (MATLAB)", _CALLS)
     if c is None:
-        return [Figure(name, ours * 1e9, "ns", spread * 1e9, f"{paper}; no C compiler here")]
-    theirs, c_spread = timed(c, _REPEATS, _CALLS)
+        return [replace(ours, compared_with=f"{ours.compared_with}; no C compiler here")]
+    theirs = timed(f"{name}, in C (-O3 -march=native)", c, _REPEATS, "ns", "the same expressions", _CALLS)
     return [
-        Figure(name, ours * 1e9, "ns", spread * 1e9, f"{paper}; same in C: {theirs * 1e9:.1f} ns"),
-        Figure(f"{name}, in C (-O3 -march=native)", theirs * 1e9, "ns", c_spread * 1e9, "the same expressions"),
-        Figure(f"{name}, ratio to C", ours / theirs, "1", None, "1: as fast as C"),
+        replace(ours, compared_with=f"{ours.compared_with}; same in C: {theirs.value:.1f} ns"),
+        theirs,
+        Figure(f"{name}, ratio to C", ours.value / theirs.value, "1", "1: as fast as C"),
     ]
 
 

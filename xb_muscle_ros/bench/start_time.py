@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from xb_muscle_ros.bench.measure import Figure, timed
+from xb_muscle_ros.bench.measure import Figure, Setting, timed
 
 _SCRIPT = (
     "from xb_muscle_ros.models.fibre_file import load_fibre\n"
@@ -15,10 +15,9 @@ _SCRIPT = (
 )
 
 
-def figures() -> list[Figure]:
+def study(setting: Setting) -> list[Figure]:
     """Time of a whole Python process that imports the package, loads a fibre and steps once."""
+    del setting  # always of the same fibre
     command = [sys.executable, "-c", _SCRIPT]
-    seconds, spread = timed(lambda: subprocess.run(command, check=True), 7)
-    return [
-        Figure("import and first step, warm cache", seconds, "s", spread, "the whole process; 1.5 s were asked for")
-    ]
+    name, asked = "import and first step, warm cache", "the whole process; 1.5 s were asked for"
+    return [timed(name, lambda: subprocess.run(command, check=True), 7, "s", asked)]

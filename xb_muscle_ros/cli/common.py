@@ -4,35 +4,75 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from xb_muscle_ros.models.fibre_file import Fibre
     from xb_muscle_ros.trials.completing import Known
     from xb_muscle_ros.trials.study import Study
     from xb_muscle_ros.work import Options
 
-    Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
 
-
-def add_fibre(parser: argparse.ArgumentParser, required: bool = True) -> None:
-    """Options that pick a fibre, a model and a method."""
+def add_bags(parser: argparse.ArgumentParser, nargs: str = "+") -> None:
+    """The recordings that a command is about."""
     parser.add_argument(
-        "--fiber", "--fibre", dest="fiber", required=required, help="fibre file, or name of a fibre in the package"
-    )
+        "bags", nargs=nargs, type=Path, metavar="BAG",
+        help="bag folder, .mcap file, or folder of bags; in the order of recording",
+    )  # fmt: skip
+
+
+def add_fibre(parser: argparse.ArgumentParser, default: str | None = None, several: bool = False, **more: Any) -> None:
+    """The option that picks a fibre.
+
+    Args:
+        parser: of the command.
+        default: the fibre without it.
+        several: it takes more than one.
+        more: further settings of the option.
+    """
+    told = "fibre file, or name of a fibre in the package" + (f" (default {default})" if default else "")
+    lists = {"nargs": "+", "action": "extend", "metavar": "FIBER", "default": []} if several else {}
+    settings = {"dest": "fiber", "default": default, "help": told, **lists, **more}
+    parser.add_argument("--fiber", "--fibre", **settings)
+
+
+def add_model(parser: argparse.ArgumentParser, changes: bool = True) -> None:
+    """Options that pick a model and a method, and with `changes` one that changes values."""
     parser.add_argument("--model", help="parameter set of the fibre file (default: the one the file names)")
+    add_method(parser)
+    if changes:
+        parser.add_argument(
+            "--set", dest="changes", metavar="NAME=VALUE", action="append", default=[], type=_change,
+            help="another value for a parameter of model or method, for example bins=200 (may be given again)",
+        )  # fmt: skip
+
+
+def add_method(parser: argparse.ArgumentParser) -> None:
+    """How heads are distributed over strain."""
     parser.add_argument("--method", help="how heads are distributed over strain (default: the fibre file's)")
+
+
+def add_settle(parser: argparse.ArgumentParser) -> None:
+    """Isometric time before a trial."""
     parser.add_argument(
-        "--set",
-        dest="changes",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        type=_change,
-        help="another value for a parameter of model or method, for example bins=200 (may be given again)",
+        "--settle", type=float, metavar="S", help="isometric time before each trial, s (default: until at rest)"
     )
+
+
+def add_out(parser: argparse.ArgumentParser, what: str, default: str | None = None, metavar: str = "DIR") -> None:
+    """Where results go, and whether they may take the place of older ones.
+
+    Args:
+        parser: of the command.
+        what: is written there.
+        default: None: it has to be given.
+        metavar: what is named.
+    """
+    text = what if default is None else f"{what} (default {default})"
+    out = None if default is None else Path(default)
+    parser.add_argument("--out", type=Path, metavar=metavar, required=default is None, default=out, help=text)
+    parser.add_argument("--overwrite", action="store_true", help="replace the results of an older run")
 
 
 def fibre_of(arguments: argparse.Namespace, for_fit: bool = False) -> Fibre:
@@ -65,7 +105,7 @@ def add_reading(parser: argparse.ArgumentParser, several: bool = False) -> None:
         "--f0", metavar="FORCE",
         help="the force that is F0, for example '0.5 mN' (default: what the bag tells, else the fibre file)",
     )  # fmt: skip
-    whose = "that has a file" if several else "of the parameters"
+    whose = "every fibre that has a file" if several else "the fibre of --fiber"
     parser.add_argument("--trials-of", metavar="FIBER", help=f"take this fibre's trials of the bags (default: {whose})")
 
 
@@ -105,15 +145,11 @@ def _change(text: str) -> tuple[str, float]:
         raise argparse.ArgumentTypeError(f"'{value}' in '{text}' is not a number") from None
 
 
-def add_overwrite(parser: argparse.ArgumentParser) -> None:
-    """The option that lets a run take the place of an older one."""
-    parser.add_argument("--overwrite", action="store_true", help="replace the results of an older run")
-
-
 def add_work(parser: argparse.ArgumentParser) -> None:
     """Options that pick where long work is done."""
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler (host:8786) whose workers do the work")
-    parser.add_argument(
+    where = parser.add_argument_group("where the work is done")
+    where.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler (host:8786) whose workers do the work")
+    where.add_argument(
         "--processes", type=int, metavar="N", help="processes on this machine (default: one per core; 0: in this one)"
     )
 
@@ -135,5 +171,7 @@ def work_options_of(arguments: argparse.Namespace, label: str = "", journal: Pat
 
 
 def warn(message: str) -> None:
-    """One line on stderr."""
-    print(f"xb_muscle: warning: {message}", file=sys.stderr)
+    """One line on stderr, above a progress bar if there is one."""
+    from xb_muscle_ros.progress import Progress
+
+    Progress.write(f"xb_muscle: warning: {message}", file=sys.stderr)

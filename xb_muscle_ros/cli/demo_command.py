@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from xb_muscle_ros.cli.common import Subparsers
+DESCRIPTION = (
+    "Import the recordings of fibre 18Dec2017a (or simulate trials in their place), replay them offline and through a "
+    "muscle_node, and draw both."
+)
 
 
-def add(subparsers: Subparsers) -> None:
-    """Add the command to the command line."""
-    parser = subparsers.add_parser(
-        "demo",
-        help="replay the recordings of fibre 18Dec2017a offline and through the node",
-        description="Import the recordings of fibre 18Dec2017a (or simulate trials), replay them offline and live.",
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument(
+        "--recordings", type=Path, metavar="DIR", help="folder of the recordings (default ../shared/data/recordings)"
     )
-    parser.add_argument("--recordings", type=Path, help="folder of the recordings (default ../shared/data/recordings)")
-    parser.add_argument("--out", type=Path, default=Path("out/demo"), help="folder for results (default out/demo)")
+    parser.add_argument("--out", type=Path, metavar="DIR", default=Path("out/demo"), help="results (default out/demo)")
     parser.add_argument("--no-live", action="store_true", help="leave the ROS 2 node out")
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -4,58 +4,39 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_overwrite, add_reading, add_work, known_of, work_options_of
+from xb_muscle_ros.cli import common
 
-if TYPE_CHECKING:
-    Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
+DESCRIPTION = (
+    "Locate where recordings and simulation differ, name what physics is missing, model it, and show how well the "
+    "augmented model does."
+)
 
 
-def add(subparsers: Subparsers) -> None:
-    """Add the command to the command line."""
-    parser = subparsers.add_parser(
-        "diagnose",
-        help="say what physics a simulation left out of recordings",
-        description="Locate where recordings and simulation differ, name what is missing, model it and show how well.",
-    )
-    parser.add_argument("bags", nargs="+", type=Path, metavar="BAG", help="bags or folders, in the order of recording")
-    parser.add_argument(
-        "--fiber",
-        "--fibre",
-        dest="fiber",
-        required=True,
-        action="extend",
-        nargs="+",
-        metavar="FIBER",
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    common.add_bags(parser)
+    common.add_fibre(
+        parser, several=True, required=True,
         help="fibre files, or names of fibres in the package; with several, bags are found by the fibre's name",
-    )
-    parser.add_argument("--model", help="parameter set of the fibre file (default: the one the file names)")
-    parser.add_argument("--method", help="how heads are distributed over strain (default: the fibre file's)")
-    add_reading(parser)
+    )  # fmt: skip
+    common.add_model(parser, changes=False)
+    common.add_reading(parser)
     parser.add_argument(
         "--features", type=Path, metavar="JSON", help="measured SRS and isometric force to be met beside the traces"
     )
     parser.add_argument(
-        "--predict",
-        type=Path,
-        metavar="JSON",
+        "--predict", type=Path, metavar="JSON",
         help="measured SRS and isometric force: predicted and compared, never fitted",
-    )
+    )  # fmt: skip
     parser.add_argument(
-        "--nuisance",
-        action="extend",
-        nargs="+",
-        default=[],
-        metavar="FAULT=SD",
-        help="SDs of ordinary measurement errors where the study knows better, such as time_shift=0.002 (s)",
-    )
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for report and results")
-    parser.add_argument("--quick", action="store_true", help="look less hard: minutes become tens of seconds")
-    parser.add_argument("--seed", type=_seed, default=1, help="of the bootstrap (default 1)")
-    add_overwrite(parser)
-    add_work(parser)
-    parser.set_defaults(run=run)
+        "--nuisance", action="extend", nargs="+", default=[], metavar="ARTEFACT=SD",
+        help="SDs of measurement artefacts where the study knows better, in their units, such as time_shift=0.002 (s)",
+    )  # fmt: skip
+    common.add_out(parser, "folder for report and results")
+    parser.add_argument("--quick", action="store_true", help="search less thoroughly: minutes become tens of seconds")
+    parser.add_argument("--seed", type=_seed, default=1, metavar="N", help="seed of the bootstrap (default 1)")
+    common.add_work(parser)
 
 
 def _seed(text: str) -> int:
@@ -82,8 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.seed,
         arguments.model,
         arguments.method,
-        work_options_of(arguments, journal=out / "journal.jsonl"),
-        known=known_of(arguments),
+        common.work_options_of(arguments, journal=out / "journal.jsonl"),
+        known=common.known_of(arguments),
         only=arguments.trials_of,
         features=arguments.features,
         predict=arguments.predict,

@@ -4,31 +4,27 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_overwrite, add_reading, add_work, warn
+from xb_muscle_ros.cli import common
+from xb_muscle_ros.errors import UserError
 
-if TYPE_CHECKING:
-    from xb_muscle_ros.cli.common import Subparsers
+DESCRIPTION = (
+    "Score models over the trials of recordings: force RMSD, short-range stiffness (SRS), AIC, paired tests; with "
+    "--paper over the paper's whole grid of conditions. Writes evaluate.json, evaluate.md, CSV files and figures."
+)
 
 
-def add(subparsers: Subparsers) -> None:
-    """Add the command to the command line."""
-    parser = subparsers.add_parser(
-        "evaluate",
-        help="score models against recordings, and set them beside the paper",
-        description="Score models over the trials of recordings: force RMSD, short-range stiffness, AIC, paired tests; "
-        "with --paper the paper's whole grid of conditions. Writes evaluate.json, .md, CSV and figures.",
-    )
-    parser.add_argument("bags", nargs="*", metavar="BAG", help="bag folder, .mcap file, or folder of bags")
-    parser.add_argument(
-        "--fiber", "--fibre", dest="fiber", nargs="+", default=[], metavar="FIBER",
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    common.add_bags(parser, nargs="*")
+    common.add_fibre(
+        parser, several=True,
         help="fibre files or names (default: the package's file of a bag's fibre; with --paper all that were measured)",
     )  # fmt: skip
-    add_reading(parser, several=True)
+    common.add_reading(parser, several=True)
     parser.add_argument("--model", nargs="+", help="parameter sets (default: all that the fibre files have)")
-    parser.add_argument("--method", help="how heads are distributed over strain (default: the fibre file's)")
-    parser.add_argument("--settle", type=float, help="isometric time before each trial, s (default: until at rest)")
+    common.add_method(parser)
+    common.add_settle(parser)
     parser.add_argument("--measured-only", action="store_true", help="evaluate the recordings alone, without models")
     parser.add_argument("--skip-bad", action="store_true", help="leave out recordings that cannot be evaluated")
     parser.add_argument(
@@ -36,16 +32,13 @@ def add(subparsers: Subparsers) -> None:
     )
     parser.add_argument("--empirical", type=Path, metavar="JSON", help="measured SRS of all fibres: empirical_srs.json")
     parser.add_argument("--golden", type=Path, metavar="JSON", help="the authors' released output: golden_srs.json")
-    parser.add_argument("--out", type=Path, required=True, help="folder for evaluate.json, tables and figures")
-    add_overwrite(parser)
-    add_work(parser)
-    parser.set_defaults(run=run)
+    common.add_out(parser, "folder for evaluate.json, tables and figures")
+    common.add_work(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Evaluate, print the tables, write the files."""
     from xb_muscle_ros.api.evaluating import evaluate
-    from xb_muscle_ros.errors import UserError
     from xb_muscle_ros.evaluate.writing import older_results
     from xb_muscle_ros.files import refuse_older
 
@@ -69,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         scheduler=arguments.scheduler,
         out=arguments.out,
         progress=True,
-        tell=warn,
+        tell=common.warn,
     )
     if str(found):
         print(found)

@@ -4,91 +4,73 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
-from xb_muscle_ros.cli.common import (
-    add_fibre,
-    add_overwrite,
-    add_reading,
-    add_work,
-    warn,
-)
+from xb_muscle_ros.cli import common
 from xb_muscle_ros.errors import UserError
 
-if TYPE_CHECKING:
-    Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
-
-_EPILOG = """RULE is KEY=VALUE with KEY one of trial (VALUE may have * and ?), pca, amplitude (L0), recovery (s): a
-trial meets it within what such conditions vary by. Faults of the measurement are pca_shift (per solution), length_gain,
+DESCRIPTION = "Fit a model to the measured force of trials; writes a fibre file, fit.json and figures."
+EPILOG = """RULE is KEY=VALUE with KEY one of trial (VALUE may have * and ?), pca, amplitude (L0), recovery (s): a
+trial meets it within what such conditions vary by. Measurement artefacts are pca_shift (per solution), length_gain,
 run_down, time_shift, transducer_lag (per study), force_offset and force_drift (per trial); ordinary are all but
 transducer_lag and force_drift."""
 
 
-def add(subparsers: Subparsers) -> None:
-    """Add the command to the command line."""
-    parser = subparsers.add_parser(
-        "fit",
-        help="estimate a fibre's parameters from recordings",
-        description="Fit a model to the measured force of trials; writes a fibre file, fit.json and figures.",
-        epilog=_EPILOG,
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    common.add_bags(parser, nargs="*")
+    common.add_fibre(parser, required=True)
+    common.add_model(parser)
+    common.add_reading(parser)
+    common.add_out(parser, "fibre file to write; the rest goes into a folder of its name", metavar="FILE")
+    several: dict[str, Any] = {"nargs": "+", "default": []}
+    what = parser.add_argument_group("what is fitted")
+    what.add_argument("--hold-out", **several, metavar="RULE", help="keep these trials out of the fit")
+    what.add_argument("--train", **several, metavar="RULE", help="fit to these trials only")
+    what.add_argument("--split", choices=("paper",), help="the paper's two protocols are fitted, the others held out")
+    what.add_argument(
+        "--window",
+        choices=("paper", "whole"),
+        default="paper",
+        help="part of the force that is fitted (default paper: around the stretches)",
     )
-    parser.add_argument("bags", nargs="*", metavar="BAG", help="bags or folders of bags, in the order of recording")
-    add_fibre(parser)
-    add_reading(parser)
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="fibre file to write")
-    parser.add_argument("--hold-out", nargs="+", default=[], metavar="RULE", help="keep these trials out of the fit")
-    parser.add_argument("--train", nargs="+", default=[], metavar="RULE", help="fit to these trials only")
-    parser.add_argument("--split", choices=("paper",), help="the paper's two protocols are fitted, the others held out")
-    parser.add_argument(
-        "--window", choices=("paper", "whole"), default="paper", help="force that counts (default: paper)"
+    what.add_argument("--weight", **several, metavar="TRIAL=W", help="weights of trials (default 1)")
+    what.add_argument("--features", type=Path, metavar="JSON", help="measured SRS and isometric force to meet as well")
+    what.add_argument("--features-of", metavar="FIBER", help="whose features (default: the fibre of the trials)")
+    what.add_argument("--force-pca-only", action="store_true", help="of the features, isometric force alone")
+    what.add_argument(
+        "--no-anchor", action="store_true", help="do not ask for an isometric force of 1 F0 (SD 0.02) at pCa 4.5"
     )
-    parser.add_argument("--weight", nargs="+", default=[], metavar="TRIAL=W", help="weights of trials (default: 1)")
-    parser.add_argument(
-        "--free",
-        nargs="+",
-        metavar="NAME",
+    of = parser.add_argument_group("parameters")
+    of.add_argument(
+        "--free", nargs="+", metavar="NAME",
         help="parameters to fit (default: those the paper fitted, and those of mechanisms)",
-    )
-    parser.add_argument("--fix", nargs="+", default=[], metavar="NAME", help="parameters that keep their start value")
-    parser.add_argument("--tie", nargs="+", default=[], metavar="A=B", help="parameter A takes the value of B")
-    parser.add_argument("--bound", nargs="+", default=[], metavar="NAME=LO:HI", help="bounds of parameters")
-    parser.add_argument(
-        "--prior", nargs="+", default=[], metavar="NAME=MEAN:SD",
+    )  # fmt: skip
+    of.add_argument("--fix", **several, metavar="NAME", help="parameters that keep their start value")
+    of.add_argument("--tie", **several, metavar="A=B", help="parameter A takes the value of B")
+    of.add_argument("--bound", **several, metavar="NAME=LO:HI", help="bounds of parameters, in their units")
+    of.add_argument(
+        "--prior", **several, metavar="NAME=MEAN:SD",
         help="prior; of positive parameters log-normal with SD as a share; inf: none (default: a factor of e)",
     )  # fmt: skip
-    errors = parser.add_mutually_exclusive_group()
+    of.add_argument(
+        "--prior-fibers", **several, metavar="FIBER", help="priors from what these other fibres' sets are like"
+    )
+    errors = of.add_mutually_exclusive_group()
     errors.add_argument(
-        "--nuisance", nargs="+", metavar="FAULT[=SD]",
-        help="faults of the measurement to fit beside the parameters; 'ordinary' for those that every set has a little "
-        "of (default), 'all' for all of them, 'none' for none",
+        "--nuisance", nargs="+", metavar="ARTEFACT[=SD]",
+        help="measurement artefacts to fit beside the parameters, with SD in their units; 'ordinary' for those that "
+        "every set has a little of (default), 'all' for all of them, 'none' for none",
     )  # fmt: skip
     errors.add_argument(
         "--no-nuisance", dest="nuisance", action="store_const", const=["none"], help="the same as --nuisance none"
     )
-    parser.add_argument(
-        "--prior-fibers",
-        nargs="+",
-        default=[],
-        metavar="FIBER",
-        help="priors from what these other fibres' sets are like",
-    )
-    parser.add_argument(
-        "--features", type=Path, metavar="JSON", help="measured SRS and isometric force to meet as well"
-    )
-    parser.add_argument("--features-of", metavar="FIBER", help="whose features (default: the fibre of the trials)")
-    parser.add_argument("--force-pca-only", action="store_true", help="of the features, isometric force alone")
-    parser.add_argument(
-        "--no-anchor", action="store_true", help="do not ask for an isometric force of 1 F0 (SD 0.02) at pCa 4.5"
-    )
-    parser.add_argument("--starts", type=int, default=4, help="descents from different points (default 4)")
-    parser.add_argument("--seed", type=int, default=1, help="of the random starts (default 1)")
-    parser.add_argument("--level", type=float, default=0.95, help="of the intervals (default 0.95)")
-    parser.add_argument(
-        "--no-intervals", action="store_true", help="leave the profiles out: the longest part of the work"
-    )
-    add_overwrite(parser)
-    add_work(parser)
-    parser.set_defaults(run=run)
+    how = parser.add_argument_group("how it is fitted")
+    how.add_argument("--starts", type=int, default=4, metavar="N", help="descents from different points (default 4)")
+    how.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the random starts (default 1)")
+    how.add_argument("--level", type=float, default=0.95, metavar="P", help="of the intervals, a share (default 0.95)")
+    how.add_argument("--no-intervals", action="store_true", help="leave the profiles out: the longest part of the work")
+    common.add_work(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -129,7 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
         scheduler=arguments.scheduler,
         journal=folder / "journal.jsonl",
         progress=True,
-        tell=warn,
+        tell=common.warn,
     )
     print(found.table)
     for path in found.save(arguments.out, overwrite=True):

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from xb_muscle_ros.cli import common
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.units import KINDS, UNITS
 
@@ -15,8 +16,6 @@ if TYPE_CHECKING:
     from xb_muscle_ros.trials.importing import Imported
     from xb_muscle_ros.trials.readers.settings import ImportSettings
     from xb_muscle_ros.trials.trial import Trial
-
-    Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
 
 # Names of the readers; the readers themselves take time to load.
 FORMATS = ("bag", "csv", "mat", "slc")
@@ -30,9 +29,9 @@ _OPTIONS: dict[str, tuple[tuple[str, ...], type, str]] = {
     "--source": (("source",), str, "where the data come from, in words"),
     "--time-column": (("columns", "time", "column"), str, "column of time"),
     "--rate": (("columns", "time", "rate"), str, "samples in a second where there is no column of time: '1000 Hz'"),
-    "--time-unit": (("columns", "time", "unit"), str, "its unit"),
+    "--time-unit": (("columns", "time", "unit"), str, "unit of time"),
     "--length-column": (("columns", "length", "column"), str, "column of length"),
-    "--length-unit": (("columns", "length", "unit"), str, "its unit"),
+    "--length-unit": (("columns", "length", "unit"), str, "unit of length"),
     "--length-is": (
         ("columns", "length", "is"),
         str,
@@ -49,45 +48,41 @@ _OPTIONS: dict[str, tuple[tuple[str, ...], type, str]] = {
         "the length that is L0, for example '42.8 mm', or 'first_isometric' (default)",
     ),
     "--force-column": (("columns", "force", "column"), str, "column of measured force or stress"),
-    "--force-unit": (("columns", "force", "unit"), str, "its unit"),
+    "--force-unit": (("columns", "force", "unit"), str, "unit of force or stress"),
     "--f0": (("f0",), str, "the force or stress that is F0, for example '97 kPa'"),
     "--calcium-column": (("columns", "calcium", "column"), str, "column of free calcium"),
-    "--calcium-unit": (("columns", "calcium", "unit"), str, "its unit"),
+    "--calcium-unit": (("columns", "calcium", "unit"), str, "unit of calcium, or pCa"),
     "--pca": (("pca",), float, "pCa of every file"),
     "--amplitude": (("amplitude_l0",), float, "amplitude of the conditioning stretch, L0"),
     "--recovery": (("recovery_s",), float, "time between shortening and test stretch, s"),
 }
 
 
-def add(subparsers: Subparsers) -> None:
-    """Add the command to the command line."""
-    units = "; ".join(
-        f"{name}: {' '.join(u for u, unit in UNITS.items() if unit.kind in KINDS[name])}" for name in KINDS
-    )
-    parser = subparsers.add_parser(
-        "import",
-        help="make bags of recordings in CSV, MATLAB, SLControl or other bags",
-        description="Make a bag of each trial. Columns and units come from a mapping file, from options, or from both; "
-        "options go first. A bag that was made of the same file with the same mapping is kept, so a run that was "
-        "stopped goes on where it was. A file that cannot be read is named and left out.",
-        epilog=f"Units of {units}. Exit code: 0 all is well, 1 some files were left out, 2 nothing was imported.",
-    )
+DESCRIPTION = (
+    "Make a bag of each trial. Columns and units come from a mapping file, from options, or from both; options go "
+    "first. A bag that was made of the same file with the same mapping is kept, so a run that was stopped goes on "
+    "where it was. A file that cannot be read is named and left out."
+)
+_BY_KIND = {name: " ".join(u for u, unit in UNITS.items() if unit.kind in KINDS[name]) for name in KINDS}
+EPILOG = (
+    f"Units of {'; '.join(f'{name}: {units}' for name, units in _BY_KIND.items())}. "
+    "Exit code: 0 all is well, 1 some files were left out, 2 nothing was imported."
+)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="recording, bag, or folder of such")
     parser.add_argument("--mapping", type=Path, metavar="YAML", help="columns, units and facts of the data set")
     parser.add_argument("--format", choices=FORMATS, help="format of the files (default: what each looks like)")
-    parser.add_argument(
-        "--out", type=Path, default=Path("bags"), metavar="DIR", help="folder of the bags (default: bags)"
-    )
+    common.add_out(parser, "folder of the bags", "bags")
     for option, (key, kind, text) in _OPTIONS.items():
         parser.add_argument(option, type=kind, dest=".".join(key), metavar=option.rpartition("-")[2].upper(), help=text)
     parser.add_argument(
-        "--isometric-scaling",
-        action=argparse.BooleanOptionalAction,
+        "--isometric-scaling", action=argparse.BooleanOptionalAction,
         help="scale each trial's force to the isometric trial of its pCa (default: where the mapping has the table)",
-    )
-    parser.add_argument("--overwrite", action="store_true", help="replace bags that exist")
+    )  # fmt: skip
     parser.add_argument("--strict", action="store_true", help="stop at the first file or trial that cannot be imported")
-    parser.set_defaults(run=run)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,61 +3,55 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
+import functools
+import itertools
 from typing import TYPE_CHECKING
 
-from xb_muscle_ros.cli.common import add_overwrite, warn
+from xb_muscle_ros.cli import common
+from xb_muscle_ros.errors import UserError
 
 if TYPE_CHECKING:
-    from xb_muscle_ros.cli.common import Subparsers
     from xb_muscle_ros.models.fibre_file import Fibre
 
 _MODELS = ("3state_coop", "hill_se", "hill", "mujoco")
+DESCRIPTION = (
+    "Step a body in MuJoCo and its muscles in turn: standing on a platform that moves (ankle), or the pendulum test "
+    "(knee). Writes loop.json, loop.csv and a figure, the same bytes each time."
+)
 
 
-def add(subparsers: Subparsers) -> None:
-    """Add the command to the command line."""
-    parser = subparsers.add_parser(
-        "loop",
-        help="couple the muscle with a body in MuJoCo",
-        description="Step a body in MuJoCo and its muscles in turn: standing on a platform that moves (ankle), or the "
-        "pendulum test (knee). Writes loop.json, loop.csv and a figure, the same bytes each time.",
-    )
-    parser.add_argument("--scene", choices=("ankle", "knee"), default="ankle", help="what to move (default: ankle)")
-    parser.add_argument("--fiber", "--fibre", dest="fiber", default="18Dec2017a", help="fibre file, or name of a fibre")
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of the command."""
+    parser.add_argument("--scene", choices=("ankle", "knee"), default="ankle", help="what to move (default ankle)")
+    common.add_fibre(parser, "18Dec2017a")
     parser.add_argument(
-        "--model",
-        dest="models",
-        action="append",
+        "--model", dest="models", metavar="MODEL", action="append",
         help=f"parameter set, or mujoco for MuJoCo's own muscle (may be given again; default: {', '.join(_MODELS)})",
-    )
-    parser.add_argument("--out", type=Path, required=True, help="folder for loop.json, loop.csv and the figure")
-    parser.add_argument("--duration", type=float, metavar="S", help="length of the run (default: ankle 0.5, knee 4)")
+    )  # fmt: skip
+    common.add_out(parser, "folder for loop.json, loop.csv and the figure")
+    parser.add_argument("--duration", type=float, metavar="S", help="length of the run, s (default: ankle 0.5, knee 4)")
     parser.add_argument(
         "--elastic-tendon", action="store_true", help="tendons stretch (default: rigid, as with a muscle_node)"
     )
     parser.add_argument(
-        "--live",
-        action="store_true",
+        "--live", action="store_true",
         help="the muscles are fibres of a running muscle_node (mode lockstep; what is missing is said)",
-    )
+    )  # fmt: skip
     ankle = parser.add_argument_group("platform of the scene ankle")
-    ankle.add_argument("--displacement", type=float, metavar="M", help="default -0.075: backwards")
-    ankle.add_argument("--speed", type=float, metavar="M_PER_S", help="default 0.2")
-    ankle.add_argument("--acceleration", type=float, metavar="M_PER_S2", help="default 2")
-    add_overwrite(parser)
-    parser.set_defaults(run=run)
+    ankle.add_argument("--displacement", type=float, metavar="M", help="way, m (default -0.075: backwards)")
+    ankle.add_argument("--speed", type=float, metavar="M_PER_S", help="speed, m/s (default 0.2)")
+    ankle.add_argument("--acceleration", type=float, metavar="M_PER_S2", help="acceleration, m/s² (default 2)")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run all models, print the table, write the files."""
-    from xb_muscle_ros.errors import UserError
     from xb_muscle_ros.files import matching, refuse_older
     from xb_muscle_ros.plant.figure import draw_loop
     from xb_muscle_ros.plant.loop import DURATION_S, Muscles, in_process, run_ankle, run_knee
     from xb_muscle_ros.plant.plant import Plant
     from xb_muscle_ros.plant.report import table, write
     from xb_muscle_ros.plant.translation import RampAndHold
+    from xb_muscle_ros.progress import Progress
 
     if arguments.live and (len(arguments.models or ()) != 1 or arguments.models == ["mujoco"]):
         raise UserError("--live is for the one model that the node has; give one --model, and not mujoco")
@@ -90,18 +84,24 @@ def run(arguments: argparse.Namespace) -> int:
         muscles = over_ros()
     if scene == "ankle":
         settings["platform"] = vars(platform)
-        traces = [run_ankle(fibre, platform, duration, elastic, muscles) for fibre in fibres]
+        runs = [functools.partial(run_ankle, fibre, platform, duration, elastic, muscles) for fibre in fibres]
         way = "backwards" if platform.displacement_m < 0.0 else "forwards"
         title = (
             f"Platform moves {100 * abs(platform.displacement_m):g} cm {way}, {platform.speed_m_per_s:g} m/s, "
             f"{platform.acceleration_m_per_s2:g} m/s²"
         )
     else:
-        traces = [run_knee(fibre, moved, duration, elastic, muscles) for moved in (False, True) for fibre in fibres]
+        both = itertools.product((False, True), fibres)
+        runs = [functools.partial(run_knee, fibre, moved, duration, elastic, muscles) for moved, fibre in both]
         title = "Leg released from level"
+    traces = []
+    with Progress(len(runs), "loop") as progress:
+        for run_one in runs:
+            traces.append(run_one())
+            progress.update()
     for trace in traces:
         if said := trace.beyond:
-            warn(said)
+            common.warn(said)
     print(table(traces))
     draw_loop(arguments.out / "loop.png", traces, f"{title}; {settings['tendon']} tendons")
     for path in [*write(arguments.out, traces, settings), arguments.out / "loop.png"]:
@@ -111,7 +111,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _fibres(name: str, models: list[str] | None) -> list[Fibre | None]:
     """A fibre for each model; None is MuJoCo's muscle. A default that the fibre file has no set for is left out."""
-    from xb_muscle_ros.errors import UserError
     from xb_muscle_ros.models.fibre_file import load_fibre
     from xb_muscle_ros.plant.drives import OWN
 
@@ -126,5 +125,5 @@ def _fibres(name: str, models: list[str] | None) -> list[Fibre | None]:
         except UserError as error:
             if models:
                 raise
-            warn(f"model {model} is left out: {error}")
+            common.warn(f"model {model} is left out: {error}")
     return fibres

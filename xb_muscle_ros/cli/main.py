@@ -10,35 +10,41 @@ from collections.abc import Sequence
 from xb_muscle_ros import __version__, programs
 from xb_muscle_ros.errors import UserError
 
-COMMANDS = (
-    "demo",
-    "import",
-    "simulate",
-    "replay",
-    "evaluate",
-    "fit",
-    "diagnose",
-    "prove",
-    "loop",
-    "bench",
-    "parameters",
-)
+COMMANDS = {
+    "demo": "replay the recordings of fibre 18Dec2017a offline and through the node",
+    "import": "make bags of recordings in CSV, MATLAB, SLControl or other bags",
+    "simulate": "simulate stretch-shorten-stretch trials into bags",
+    "replay": "replay bags through the model and compare forces",
+    "evaluate": "score models against recordings, and set them beside the paper",
+    "fit": "estimate a fibre's parameters from recordings",
+    "diagnose": "say what physics a simulation left out of recordings",
+    "prove": "test diagnoses blind: conceal effects, diagnose, score",
+    "loop": "couple the muscle with a body in MuJoCo",
+    "bench": "measure how fast models and node are",
+    "parameters": "list parameters with unit, range and meaning",
+}
+"""Each is a module ``<name>_command`` of this folder: ``DESCRIPTION``, ``add_arguments`` and ``run``."""
 
 
-def parser() -> argparse.ArgumentParser:
-    """The whole command line."""
+def build_parser() -> argparse.ArgumentParser:
+    """The whole command line, with the arguments of every command."""
     made = argparse.ArgumentParser(prog="xb_muscle", description="Cross-bridge muscle: simulate, replay, measure.")
     made.add_argument("--version", action="version", version=f"xb_muscle {__version__}")
     subparsers = made.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name in COMMANDS:
-        importlib.import_module(f"xb_muscle_ros.cli.{name}_command").add(subparsers)
+    for name, text in COMMANDS.items():
+        module = importlib.import_module(f"xb_muscle_ros.cli.{name}_command")
+        command = subparsers.add_parser(
+            name, help=text, description=module.DESCRIPTION, epilog=getattr(module, "EPILOG", None)
+        )
+        module.add_arguments(command)
+        command.set_defaults(run=getattr(module, "run", None))
     return made
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit code. What a user can mend is one line on stderr and code 2."""
     try:
-        arguments = parser().parse_args(argv)
+        arguments = build_parser().parse_args(argv)
         return int(arguments.run(arguments))
     except UserError as error:
         print(f"xb_muscle: error: {error}", file=sys.stderr)

@@ -93,7 +93,7 @@ def relative_srs_rmsd(
         theirs = relative_at_conditions(data, reading, data).centre
         each = {key: rmsd(ours, theirs, mask & counted) for key, mask in sets(reading.large).items()}
         found[name] = RelativeRmsd(
-            {key: value if n else None for key, (value, _, n) in each.items()},
-            {key: n for key, (_, _, n) in each.items()},
+            {key: each_set.value for key, each_set in each.items()},
+            {key: each_set.n for key, each_set in each.items()},
         )
     return found

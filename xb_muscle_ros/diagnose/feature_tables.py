@@ -122,7 +122,7 @@ def measured_cells(data: SrsTable, fibre: str) -> tuple[Feature, ...]:
     Isometric force and conditioning stretch are means over the trials that have them.
     """
     held = data.fibres[fibre]
-    isometric, unconditioned = data.isometric_f0(fibre), data.unconditioned(fibre, "conditioning")
+    isometric, unconditioned = data.isometric_f0(fibre), data.unconditioned(fibre, "conditioning")[0]
     found: list[Feature] = []
     for i, pca in enumerate(data.pca.tolist()):
         for kind, value in (("isometric_force", isometric[i]), ("srs_conditioning", unconditioned[i])):

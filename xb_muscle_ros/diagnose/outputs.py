@@ -18,7 +18,7 @@ from xb_muscle_ros.diagnose.report.prose import headline, summary
 from xb_muscle_ros.diagnose.report.traces import TrialTraces, write_traces
 from xb_muscle_ros.diagnose.result import Diagnosis
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import matching, write_text
+from xb_muscle_ros.files import matching, write_json, write_text
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.fibre_writing import write_fibre
 from xb_muscle_ros.trials.bag_files import remove_results
@@ -100,7 +100,7 @@ def _write(out: Path, d: Diagnosis, made: Files, report: bool) -> None:
 
         write_text(out / PAGE, as_html(d, made.traces))
     write_traces(out / TRACES, made.traces)
-    write_text(out / JSON, json.dumps(as_row(d), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+    write_json(out / JSON, as_row(d))
 
 
 def as_row(d: Diagnosis) -> dict[str, Any]:

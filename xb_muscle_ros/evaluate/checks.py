@@ -1,4 +1,4 @@
-"""Is a recording fit to be evaluated? Each fault is one line that names the bag, the value and the remedy."""
+"""Is a recording fit to be evaluated? What is wrong is one line with the bag, the value and the remedy."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.completing import pca_of
-from xb_muscle_ros.trials.trial import Trial
+from xb_muscle_ros.trials.trial import Phase, Trial
 
 
 def check_trial(trial: Trial, where: str) -> None:
@@ -23,25 +23,23 @@ def check_trial(trial: Trial, where: str) -> None:
         raise UserError(
             f"bag {where}: there is no measured force on /muscle/measured_force; evaluate compares with measurements"
         )
-    _check_pca(trial, where)
-    _check_cover(trial, where)
-
-
-def _check_pca(trial: Trial, where: str) -> None:
     calcium = trial.calcium_um
     if pca_of(trial) is None and np.ptp(calcium) == 0.0:
         raise UserError(
             f"bag {where}: pCa is missing: custom_data has no 'pca' and calcium is {calcium[0]:g} µM; add one of them"
         )
+    _check_cover(trial, where)
+
+
+def moving(trial: Trial) -> list[Phase]:
+    """Phases in which the length changes."""
+    return [phase for phase in trial.facts.phases if "stretch" in phase.name or phase.name in ("shortening", "release")]
 
 
 def _check_cover(trial: Trial, where: str) -> None:
     """Force has to be there where length moves."""
-    stretches = [
-        phase for phase in trial.facts.phases if "stretch" in phase.name or phase.name in ("shortening", "release")
-    ]
-    first = min((p.start_s for p in stretches), default=float(trial.time_s[0]))
-    last = min(max((p.end_s for p in stretches), default=np.inf), float(trial.time_s[-1]))
+    first = min((p.start_s for p in moving(trial)), default=float(trial.time_s[0]))
+    last = min(max((p.end_s for p in moving(trial)), default=np.inf), float(trial.time_s[-1]))
     step = float(np.max(np.diff(trial.force_time_s), initial=0.0))
     usual = float(np.median(np.diff(trial.force_time_s)))
     begin, end = float(trial.force_time_s[0]), float(trial.force_time_s[-1])

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.evaluate.sets import rank
+from xb_muscle_ros.evaluate.srs_table import levels, near
 from xb_muscle_ros.evaluate.trials import WINDOWS, Trials
 from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0, COMMON_PCA, COMMON_RECOVERY_S
-from xb_muscle_ros.scores.paired import bonferroni_threshold, paired_t
+from xb_muscle_ros.scores.statistics import Paired, bonferroni_threshold, paired_t
 from xb_muscle_ros.trials.trial import Array
 
 SLICES = ("pca", "amplitude_l0", "recovery_s")
 
 
-class Spread(NamedTuple):
+@dataclass(frozen=True)
+class Spread:
     """Over fibres.
 
     Attributes:
@@ -30,8 +33,68 @@ class Spread(NamedTuple):
 
     mean: float
     sd: float | None
-    fibres: dict[str, float]
+    fibres: Mapping[str, float]
     trials: int
+
+
+Spreads = Mapping[str, Mapping[str, Spread | None]]
+"""By model and window; None where no trial has a value."""
+
+
+@dataclass(frozen=True)
+class Slice:
+    """Trials at one level of what is varied, the rest at the common condition."""
+
+    level: float
+    models: Spreads
+
+
+@dataclass(frozen=True)
+class PairedTest:
+    """Paired t-test between two models in one window; `significant` is None where there is no test."""
+
+    first: str
+    second: str
+    window: str
+    found: Paired
+    significant: bool | None
+
+    def as_row(self) -> dict[str, Any]:
+        """Entry of ``evaluate.json``."""
+        names = {"first": self.first, "second": self.second, "window": self.window}
+        return {**names, **self.found._asdict(), "significant": self.significant}
+
+
+@dataclass(frozen=True)
+class PairedTests:
+    """Tests between neighbours in complexity; a p below the threshold, 0.05 over their number, is significant."""
+
+    threshold: float
+    comparisons: Sequence[PairedTest]
+
+
+@dataclass(frozen=True)
+class ForceScores:
+    """``force_rmsd`` of ``evaluate.json``.
+
+    Attributes:
+        overall: over all trials.
+        common_condition: that slices have in common.
+        slices: by what is varied, one for each level.
+        paired_t_tests: between models.
+        unit: of all RMSD.
+    """
+
+    overall: Spreads
+    common_condition: Mapping[str, float]
+    slices: Mapping[str, Sequence[Slice]]
+    paired_t_tests: PairedTests
+    unit: str = "F0"
+
+
+def force_scores(trials: Trials) -> ForceScores:
+    """All force RMSD of the recordings."""
+    return ForceScores(overall(trials), common_condition(trials), slices(trials), paired_tests(trials))
 
 
 def spread(trials: Trials, values: Array, where: npt.NDArray[np.bool_]) -> Spread | None:
@@ -49,20 +112,15 @@ def spread(trials: Trials, values: Array, where: npt.NDArray[np.bool_]) -> Sprea
     return Spread(float(np.mean(each)), sd, means, int(np.count_nonzero(used & trials.good)))
 
 
-def models_of(trials: Trials) -> list[str]:
-    """Parameter sets that were compared, simplest model first."""
-    return sorted(trials.models, key=lambda name: (rank(name), name))
-
-
-def overall(trials: Trials) -> dict[str, dict[str, Spread | None]]:
-    """Force RMSD by model and window, over all trials."""
+def overall(trials: Trials) -> Spreads:
+    """Force RMSD over all trials."""
     return _spreads(trials, trials.good)
 
 
-def _spreads(trials: Trials, where: npt.NDArray[np.bool_]) -> dict[str, dict[str, Spread | None]]:
+def _spreads(trials: Trials, where: npt.NDArray[np.bool_]) -> Spreads:
     return {
-        name: {window: spread(trials, trials.models[name][f"rmsd_{window}"], where) for window in WINDOWS}
-        for name in models_of(trials)
+        name: {window: spread(trials, trials.column(name, f"rmsd_{window}")[0], where) for window in WINDOWS}
+        for name in trials.models
     }
 
 
@@ -75,7 +133,7 @@ def common_condition(trials: Trials) -> dict[str, float]:
         values = values[np.isfinite(values)]
         if not values.size:
             continue
-        if np.any(_near(values, wanted)):
+        if np.any(near(values, wanted)):
             chosen[name] = wanted
         else:
             counted = Counter(float(f"{v:.6g}") for v in values)
@@ -83,22 +141,18 @@ def common_condition(trials: Trials) -> dict[str, float]:
     return chosen
 
 
-def slices(trials: Trials) -> dict[str, list[dict[str, Any]]]:
-    """Force RMSD with one of pCa, amplitude and recovery time varied, the others at the common condition.
-
-    Returns:
-        by what is varied: one entry for each level, with ``level`` and ``models``: model -> window -> spread.
-    """
+def slices(trials: Trials) -> dict[str, list[Slice]]:
+    """Force RMSD with one of pCa, amplitude and recovery time varied, the others at the common condition."""
     common = common_condition(trials)
-    found: dict[str, list[dict[str, Any]]] = {}
+    found: dict[str, list[Slice]] = {}
     for varied in SLICES:
         held = trials.good
         for name in SLICES:
             if name != varied and name in common:
-                held = held & _near(getattr(trials, name), common[name])
+                held = held & near(getattr(trials, name), common[name])
         values = getattr(trials, varied)
-        levels = np.unique([float(f"{v:.6g}") for v in values[held & np.isfinite(values)]]).tolist()
-        found[varied] = [{"level": level, "models": _spreads(trials, held & _near(values, level))} for level in levels]
+        at = levels(values[held & np.isfinite(values)]).tolist()
+        found[varied] = [Slice(level, _spreads(trials, held & near(values, level))) for level in at]
     return found
 
 
@@ -114,31 +168,32 @@ def neighbours(models: Sequence[str]) -> list[tuple[str, str]]:
     ]
 
 
-def paired_tests(trials: Trials) -> dict[str, Any]:
+def paired_tests(trials: Trials) -> PairedTests:
     """Paired t-tests of force RMSD between neighbours in complexity, in each window, over fibres.
 
     A fibre's value is its mean over the trials that both models of a pair have.
-
-    Returns:
-        ``threshold`` (0.05 over the number of comparisons), ``comparisons``: one entry for each.
     """
-    pairs = [(a, b, window) for a, b in neighbours(models_of(trials)) for window in WINDOWS]
+    pairs = [(a, b, window) for a, b in neighbours(trials.models) for window in WINDOWS]
     threshold = bonferroni_threshold(len(pairs))
-    entries = []
+    tests = []
     for first, second, window in pairs:
-        a, b = (trials.models[name][f"rmsd_{window}"] for name in (first, second))
+        a, b = (trials.column(name, f"rmsd_{window}")[0] for name in (first, second))
         both = np.isfinite(a) & np.isfinite(b)
-        of_a, of_b = spread(trials, a, both), spread(trials, b, both)
-        names = list(of_a.fibres) if of_a else []
-        result = paired_t(
-            [of_a.fibres[n] for n in names] if of_a else [], [of_b.fibres[n] for n in names] if of_b else []
-        )
-        significant = None if result.p is None else result.p < threshold
-        names_and_window = {"first": first, "second": second, "window": window}
-        entries.append({**names_and_window, **result._asdict(), "significant": significant})
-    return {"threshold": threshold, "comparisons": entries}
+        # The same trials, and so the same fibres in the same order.
+        of_a, of_b = (list(held.fibres.values()) if (held := spread(trials, v, both)) else [] for v in (a, b))
+        found = paired_t(of_a, of_b)
+        tests.append(PairedTest(first, second, window, found, None if found.p is None else found.p < threshold))
+    return PairedTests(threshold, tests)
 
 
-def _near(values: Array, level: float) -> npt.NDArray[np.bool_]:
-    near: npt.NDArray[np.bool_] = np.isclose(values, level, rtol=1e-3, atol=1e-6)
-    return near
+def force_rows(scores: ForceScores) -> Iterator[dict[str, Any]]:
+    """Rows of ``force_rmsd.csv``."""
+    groups: list[tuple[str, float | None, Spreads]] = [("all trials", None, scores.overall)]
+    groups += [(varied, each.level, each.models) for varied, at in scores.slices.items() for each in at]
+    for varied, level, models in groups:
+        for name, windows in models.items():
+            for window, held in windows.items():
+                if held is not None:
+                    where = {"varied": varied, "level": level, "model": name, "window": window}
+                    numbers = {"mean_f0": held.mean, "sd_f0": held.sd, "fibres": len(held.fibres)}
+                    yield {**where, **numbers, "trials": held.trials}

@@ -9,6 +9,7 @@ a second.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,8 @@ from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.plain import fibre_to_plain, muscle_of_plain
 from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0
-from xb_muscle_ros.scores.estimate import Missing
-from xb_muscle_ros.scores.redevelopment import Redevelopment, redevelopment
+from xb_muscle_ros.scores.estimate import Estimate, Missing
+from xb_muscle_ros.scores.redevelopment import redevelopment
 from xb_muscle_ros.simulation.stretches import followed, onset_stiffness, stretched_and_back
 from xb_muscle_ros.trials.trial import Array
 
@@ -62,24 +63,39 @@ def tasks(
     ]
 
 
+@dataclass(frozen=True)
+class Cells:
+    """What one fibre shows at one pCa.
+
+    Attributes:
+        srs_test: F0/L0, recovery x amplitude.
+        srs_conditioning: F0/L0.
+        isometric_f0: F0.
+        k_tr: rate of force redevelopment, 1/s, or why force does not redevelop or the release cannot be simulated.
+    """
+
+    srs_test: Sequence[Sequence[float]]
+    srs_conditioning: float
+    isometric_f0: float
+    k_tr: Estimate
+
+    @classmethod
+    def of_plain(cls, row: Mapping[str, Any]) -> Cells:
+        """From plain data, as `simulate` gives it and JSON gives it back."""
+        return cls(**{**row, "k_tr": Estimate(*row["k_tr"])})
+
+
 def simulate(task: Mapping[str, Any]) -> dict[str, Any]:
-    """Cells of one fibre and pCa.
-
-    Args:
-        task: of `tasks`.
-
-    Returns:
-        ``srs_test`` (recovery x amplitude) and ``srs_conditioning``, F0/L0; ``isometric_f0``; ``k_tr``: rate,
-        1/s, or None; ``k_tr_problem``: why force does not redevelop or the release cannot be simulated, or None.
+    """`Cells` of one fibre and pCa, a task of `tasks`, as plain data.
 
     Raises:
         UserError, StateViolation: see `Muscle.settle` and `Muscle.step`.
     """
     with naming(f"simulation at pCa {task['pca']:g}"):
-        return _simulated(muscle_of_plain(task["fibre"]), task)
+        return asdict(_simulated(muscle_of_plain(task["fibre"]), task))
 
 
-def _simulated(muscle: Muscle, task: Mapping[str, Any]) -> dict[str, Any]:
+def _simulated(muscle: Muscle, task: Mapping[str, Any]) -> Cells:
     calcium = 10.0 ** (6.0 - task["pca"])
     settled = muscle.settle(0.0, calcium, task["settle_s"])
     recoveries = np.array(task["recoveries_s"])
@@ -88,26 +104,16 @@ def _simulated(muscle: Muscle, task: Mapping[str, Any]) -> dict[str, Any]:
         state = stretched_and_back(muscle, settled, amplitude, calcium) if amplitude else settled
         for i, recovered in enumerate(followed(muscle, state, recoveries, 0.0 * recoveries, calcium)):
             srs_test[i, j] = onset_stiffness(muscle, recovered, calcium)
-    k_tr, problem = None, None
     try:
-        found = _redeveloped(muscle, settled, calcium)
-        if isinstance(found, Missing):
-            problem = found.why
-        else:
-            k_tr = {"k_per_s": found.k_per_s, "se_per_s": None, "why": ""}  # no noise, no error
+        k_tr = _redeveloped(muscle, settled, calcium)
     except UserError as error:
         # A hundred times as fast as the protocol: not every method follows, and nothing else depends on it.
-        problem = str(error)
-    return {
-        "srs_test": srs_test.tolist(),
-        "srs_conditioning": onset_stiffness(muscle, settled, calcium),
-        "isometric_f0": muscle.outputs(settled).force_f0,
-        "k_tr": k_tr,
-        "k_tr_problem": problem,
-    }
+        k_tr = Estimate(None, why=str(error))
+    conditioning, isometric_f0 = onset_stiffness(muscle, settled, calcium), muscle.outputs(settled).force_f0
+    return Cells(srs_test.tolist(), conditioning, isometric_f0, k_tr)
 
 
-def table(label: str, fibres: Sequence[Fibre], made: Sequence[Task], results: Sequence[Mapping[str, Any]]) -> SrsTable:
+def table(label: str, fibres: Sequence[Fibre], made: Sequence[Task], results: Sequence[Cells]) -> SrsTable:
     """Results of one set's tasks as a table.
 
     Args:
@@ -123,17 +129,19 @@ def table(label: str, fibres: Sequence[Fibre], made: Sequence[Task], results: Se
     for k, fibre in enumerate(fibres):
         cells = results[k * len(pcas) : (k + 1) * len(pcas)]
         conditioning, isometric = np.full(shape, np.nan), np.full(shape, np.nan)
-        isometric[:] = np.array([cell["isometric_f0"] for cell in cells])[:, None, None]
+        isometric[:] = np.array([cell.isometric_f0 for cell in cells])[:, None, None]
         if column is not None:
-            conditioning[:, :, column] = np.array([cell["srs_conditioning"] for cell in cells])[:, None]
-        held[fibre.name] = FibreSrs(np.array([cell["srs_test"] for cell in cells]), conditioning, isometric)
+            conditioning[:, :, column] = np.array([cell.srs_conditioning for cell in cells])[:, None]
+        held[fibre.name] = FibreSrs(np.array([cell.srs_test for cell in cells]), conditioning, isometric)
     return SrsTable(label, np.array(pcas), recoveries, amplitudes, held)
 
 
-def _redeveloped(muscle: Muscle, state: Array, calcium: float) -> Redevelopment | Missing:
+def _redeveloped(muscle: Muscle, state: Array, calcium: float) -> Estimate:
     corner_s = np.cumsum([_RELEASE_RAMP_S, _RELEASED_S, _RELEASE_RAMP_S])
     away = followed(muscle, state, corner_s, np.array([-_RELEASE_L0, -_RELEASE_L0, 0.0]), calcium)[-1]
     time_s = np.arange(1, round(_REDEVELOP_S * 1e3) + 1) * 1e-3
     states = followed(muscle, away, time_s, 0.0 * time_s, calcium)
     force = muscle.outputs_of(states)["force_f0"]
-    return redevelopment(time_s, force, 0.0, _REDEVELOP_S)
+    found = redevelopment(time_s, force, 0.0, _REDEVELOP_S)
+    # Without noise there is no error.
+    return Estimate(None, why=found.why) if isinstance(found, Missing) else Estimate(found.k_per_s)

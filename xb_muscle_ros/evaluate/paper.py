@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from xb_muscle_ros.evaluate.sets import ModelSet
-from xb_muscle_ros.evaluate.srs_scores import READINGS, Reading, profile_rmsd, score
+from xb_muscle_ros.evaluate.srs_scores import ALL_READINGS, READINGS, Reading, SrsScores, profile_rmsd, score
 from xb_muscle_ros.evaluate.srs_table import SrsTable
 from xb_muscle_ros.scores.activation import CLASSES
 from xb_muscle_ros.scores.conditions import LARGE_ABOVE_L0, LARGE_BELOW_S, SETS
@@ -90,16 +91,75 @@ class Source(NamedTuple):
     k_tr: Mapping[str, Sequence[float]]
 
 
+@dataclass(frozen=True)
+class Comparison:
+    """One reported number, and ours.
+
+    Attributes:
+        quantity, model, where: see `Reported`.
+        paper: the number as the paper has it.
+        values: source -> reading -> number; None where it cannot be had.
+        agrees: the same -> whether it is the paper's number or in its range to 0.01, or within its bound.
+        remark: what is to be said of it.
+    """
+
+    quantity: str
+    model: str
+    paper: str
+    where: str
+    values: Mapping[str, Mapping[str, float | None]]
+    agrees: Mapping[str, Mapping[str, bool | None]]
+    remark: str
+
+
+@dataclass(frozen=True)
+class ReadingRow:
+    """SRS RMSD and AIC of a source's model under one reading; on how many fibres."""
+
+    source: str
+    model: str
+    fibres: int
+    reading: Reading
+    scores: SrsScores
+
+    def as_row(self) -> dict[str, Any]:
+        """Entry of ``evaluate.json``, and row of ``srs_rmsd.csv``."""
+        rmsd = {f"rmsd_{name}": self.scores.rmsd[name] for name in SETS}
+        of = {"source": self.source, "model": self.model, "fibres": self.fibres}
+        return {**of, **self.reading._asdict(), **rmsd, "aic": self.scores.aic}
+
+
+@dataclass(frozen=True)
+class PaperSection:
+    """What the paper reports beside the same of our simulations.
+
+    Attributes:
+        sources: names.
+        readings_shown: names of the readings under which numbers are compared.
+        comparison: one for each reported number.
+        readings: every source and model under every reading.
+        recordings: whether recordings were evaluated as well.
+    """
+
+    sources: Sequence[str]
+    readings_shown: Sequence[str]
+    comparison: Sequence[Comparison]
+    readings: Sequence[ReadingRow]
+    recordings: bool
+
+
+def paper_section(
+    sources: Sequence[Source], data: SrsTable, models: Sequence[ModelSet], recordings: bool
+) -> PaperSection:
+    """All of it."""
+    comparison, readings = compare(sources, data, models), readings_table(sources, data, models, ALL_READINGS)
+    return PaperSection([source.name for source in sources], list(READINGS), comparison, readings, recordings)
+
+
 def compare(
     sources: Sequence[Source], data: SrsTable, models: Sequence[ModelSet], reported: Sequence[Reported] = REPORTED
-) -> list[dict[str, Any]]:
-    """One entry for each reported number.
-
-    Returns:
-        entries with ``quantity``, ``model``, ``paper``, ``where``; ``values``: source -> reading -> number or None;
-        ``agrees``: the same -> whether it is the paper's number or in its range to 0.01, or within its bound; and
-        ``remark``.
-    """
+) -> list[Comparison]:
+    """One entry for each reported number."""
     held = {each.name: each for each in models}
     entries = []
     for row in reported:
@@ -107,17 +167,9 @@ def compare(
             source.name: {name: computed(row, source, data, reading) for name, reading in READINGS.items()}
             for source in sources
         }
-        entries.append(
-            {
-                "quantity": row.quantity,
-                "model": row.model,
-                "paper": row.text,
-                "where": row.where,
-                "values": values,
-                "agrees": {s: {r: _agrees(v, row) for r, v in by.items()} for s, by in values.items()},
-                "remark": _remark(row, held.get(row.model), values),
-            }
-        )
+        agrees = {s: {r: _agrees(v, row) for r, v in by.items()} for s, by in values.items()}
+        remark = _remark(row, held.get(row.model), values)
+        entries.append(Comparison(row.quantity, row.model, row.text, row.where, values, agrees, remark))
     return entries
 
 
@@ -156,14 +208,11 @@ def _agrees(value: float | None, row: Reported) -> bool | None:
 
 
 def _remark(row: Reported, held: ModelSet | None, values: Mapping[str, Mapping[str, float | None]]) -> str:
-    if row.quantity == "k_tr":
-        measured = "the paper's is measured; ours is the models' at pCa 4.5 after a release by a fifth of the length"
-        some = any(v is not None for by in values.values() for v in by.values())
-        if held is None:
-            return "no parameter set released for this model"
-        return measured if some else _NO_REDEVELOPMENT
     if held is None:
         return "no parameter set released for this model"
+    if row.quantity == "k_tr":
+        measured = "the paper's is measured; ours is the models' at pCa 4.5 after a release by a fifth of the length"
+        return measured if any(v is not None for by in values.values() for v in by.values()) else _NO_REDEVELOPMENT
     notes = []
     if held.borrowed_from:
         notes.append(f"set borrowed from {held.borrowed_from}, not fitted for this model")
@@ -176,24 +225,14 @@ def _remark(row: Reported, held: ModelSet | None, values: Mapping[str, Mapping[s
 
 def readings_table(
     sources: Sequence[Source], data: SrsTable, models: Sequence[ModelSet], readings: Sequence[Reading]
-) -> list[dict[str, Any]]:
-    """SRS RMSD of every source and model under every reading."""
-    rows = []
-    for source in sources:
-        for each in models:
-            table = source.tables.get(each.name)
-            if table is None or not table.fibres:
-                continue
-            for reading in readings:
-                found = score(table, data, reading, each.fitted_parameters)
-                rows.append(
-                    {
-                        "source": source.name,
-                        "model": each.name,
-                        "fibres": len(table.fibres),
-                        **reading._asdict(),
-                        **{f"rmsd_{name}": found.rmsd[name] for name in SETS},
-                        "aic": found.aic,
-                    }
-                )
-    return rows
+) -> list[ReadingRow]:
+    """Every source and model under every reading."""
+    return [
+        ReadingRow(
+            source.name, each.name, len(table.fibres), reading, score(table, data, reading, each.fitted_parameters)
+        )
+        for source in sources
+        for each in models
+        if (table := source.tables.get(each.name)) is not None and table.fibres
+        for reading in readings
+    ]

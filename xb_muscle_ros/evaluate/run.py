@@ -11,16 +11,27 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.evaluate import bags as bag_tasks
-from xb_muscle_ros.evaluate import grid, more_scores, pairs_of_bags, sections
+from xb_muscle_ros.evaluate import grid
+from xb_muscle_ros.evaluate.curves import RedevelopmentRow, force_pca_of_table, force_pca_of_trials, redevelopment_rows
+from xb_muscle_ros.evaluate.enhancement import (
+    EnhancementRow,
+    enhancement_pairs,
+    enhancement_rows,
+    enhancement_task,
+    evaluate_enhancement,
+)
+from xb_muscle_ros.evaluate.fibre_cache import all_fibre_files
 from xb_muscle_ros.evaluate.figures.srs import NOTHING_TO_DRAW, drawable
+from xb_muscle_ros.evaluate.force_scores import force_scores
 from xb_muscle_ros.evaluate.golden import GOLDEN, OURS, golden_sources
-from xb_muscle_ros.evaluate.paper import Source, compare, readings_table
-from xb_muscle_ros.evaluate.results import Request, Results
+from xb_muscle_ros.evaluate.paper import Source, paper_section
+from xb_muscle_ros.evaluate.request import Request
+from xb_muscle_ros.evaluate.results import Results, Sections
+from xb_muscle_ros.evaluate.sections import TrialsSection, left_out_lines, notes, sets_section, srs_section
 from xb_muscle_ros.evaluate.sets import file_serving, gather, served_line, value_lines
-from xb_muscle_ros.evaluate.srs_scores import ALL_READINGS, READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, read_table, read_tables
-from xb_muscle_ros.evaluate.trials import MEASURED, Trials, duplicates, srs_table
-from xb_muscle_ros.models.fibre_file import fibre_folders, find_fibre_file, load_fibre
+from xb_muscle_ros.evaluate.trials import MEASURED, Evaluated, Trials, srs_table
+from xb_muscle_ros.models.fibre_file import find_fibre_file, load_fibre
 from xb_muscle_ros.scores.enhancement import AFTER_S
 from xb_muscle_ros.trials.bags import find_bags
 from xb_muscle_ros.trials.completing import counted
@@ -41,16 +52,15 @@ def evaluate(request: Request, tell: Callable[[str], None] = lambda line: None) 
         UserError: a file, fibre, model or recording cannot be used; `work` cannot be done.
         StateViolation: see `Muscle.step`.
     """
-    # Tables are read first: a fault in them shows before hours of work, and before the folder is made.
-    data = read_table(request.empirical, "measured") if request.empirical is not None else None
+    # Tables are read first: an error in them shows before hours of work, and before the folder is made.
+    data = read_table(request.empirical, MEASURED) if request.empirical is not None else None
     golden = read_tables(request.golden, GOLDEN) if request.golden is not None else {}
-    results = Results({"sets": [], "force_pca": [], "k_tr": [], "residual_force_enhancement": []})
-    if request.bags:
-        _recordings(request, results, tell)
+    results = _recordings(request, tell) if request.bags else Results(Sections())
     if data is not None:
-        _paper(request, results, data, golden)
-    if results.data and results.tables and not drawable(results.data, results.tables, results.sections["srs"]):
-        results.warnings.append(NOTHING_TO_DRAW)
+        results = _with_paper(request, results, data, golden)
+    srs = results.sections.srs
+    if srs is not None and results.data and results.tables and not drawable(results.data, results.tables, srs):
+        results = replace(results, warnings=[*results.warnings, NOTHING_TO_DRAW])
     return results
 
 
@@ -58,73 +68,66 @@ def _work(request: Request, label: str) -> Options:
     return replace(request.work, journal=request.out / JOURNAL, label=label)
 
 
-def _recordings(request: Request, results: Results, tell: Callable[[str], None]) -> None:
-    found = find_bags(request.bags)
+def _recordings(request: Request, tell: Callable[[str], None]) -> Results:
     files = _fibre_files(request.fibres)
-    made = bag_tasks.tasks(
-        found, files, request.models, request.method, request.settle_s, request.measured_only, request.known,
-        request.only,
-    )  # fmt: skip
-    trials = results.trials = _of_bags(request, results, made)
-    _settle_problems(request, trials, tell)
-    results.warnings += trials.warnings
+    made = bag_tasks.tasks(request, find_bags(request.bags), files)
+    found, warnings = _of_bags(request, made)
+    trials = Trials(found)
+    _tell_problems(request, trials, tell)
+    warnings += trials.warnings
+    models = []
     if not request.measured_only:
         served = served_line(files, trials.fibres)
-        results.warnings += [served] if served else []
         # Fibres without a file of their own may share one.
         named = list(dict.fromkeys(file_serving(files, name) for name in trials.fibres))
-        results.models = gather(named, request.models, request.method)
-        results.warnings += value_lines(results.models)
-    found_sections = results.sections
-    found_sections["sets"] = sections.sets_section(results.models)
-    found_sections["trials"] = {
-        "used": int(np.count_nonzero(trials.good)),
-        "fibres": trials.fibres,
-        "left_out": [trials.problems[bag] for bag in sorted(trials.problems)],
-        "missing": {name: sorted(fibres) for name, fibres in sorted(trials.missing.items())},
-    }
-    found_sections["force_rmsd"] = sections.force_section(trials)
-    found_sections["force_pca"] += more_scores.force_pca_of_trials(trials)
-    found_sections["k_tr"] += more_scores.k_tr_rows(trials)
-    _enhancement(request, results, made[0])
-    found_sections["notes"] = sections.notes(trials, found_sections)
-    results.warnings += found_sections["notes"]
-    data = srs_table(trials, None, MEASURED)
+        models = gather(named, request.models, request.method)
+        warnings += [*([served] if served else []), *value_lines(models)]
+    left_out = [trials.problems[bag] for bag in sorted(trials.problems)]
+    curves, enhancements = force_pca_of_trials(trials), _enhancements(request, trials, made[0])
+    told = notes(trials, curves, enhancements)
+    warnings += told
+    tables: dict[str, SrsTable] = {}
+    srs = None
+    data = srs_table(trials, MEASURED, MEASURED)
     if data is not None:
-        results.data = data
-        for each in results.models:
-            table = srs_table(trials, each.name, each.title) if each.name in trials.models else None
-            if table is not None:
-                results.tables[each.name] = table
-        found_sections["srs"] = sections.srs_section(results.tables, data, results.models)
-        results.warnings += sections.left_out_lines(found_sections["srs"])
+        made_of = {each.name: srs_table(trials, each.name, each.title) for each in models if each.name in trials.models}
+        tables = {name: table for name, table in made_of.items() if table is not None}
+        srs = srs_section(tables, data, models)
+        warnings += left_out_lines(srs)
+    sections = Sections(
+        sets=sets_section(models),
+        trials=TrialsSection(int(np.count_nonzero(trials.good)), trials.fibres, left_out, trials.missing),
+        force_rmsd=force_scores(trials),
+        srs=srs,
+        force_pca=curves,
+        k_tr=redevelopment_rows(trials),
+        residual_force_enhancement=enhancements,
+        enhancement_after_s=AFTER_S if enhancements else None,
+        notes=told,
+    )
+    return Results(sections, warnings, trials, tables, data)
 
 
-def _of_bags(request: Request, results: Results, made: Sequence[Mapping[str, Any]]) -> Trials:
-    """What the bags' trials show; a bag of several fibres has as many."""
-    several: dict[int, list[dict[str, Any]]] = {}
-    done: dict[int, Mapping[str, Any]] = {}
-    lines: list[tuple[str, ...]] = []
-    for index, one in stream(bag_tasks.evaluate_bag, made, _work(request, "recordings")):
-        if "several" in one:
-            several[index], line = bag_tasks.tasks_of_fibres(made[index], one)
-            lines += [(line,)] if line is not None else []
-        else:
-            done[index] = one
-    # One trial after the other in the order of the bags, whichever was ready first.
-    places = [(index, k) for index in range(len(made)) for k in range(len(several.get(index, [0])))]
-    trials = Trials(len(places))
-    more = [(place, several[index][k]) for place, (index, k) in enumerate(places) if index in several]
-    for place, (index, _) in enumerate(places):
-        if index in done:
-            trials.add(place, done[index])
-            lines.append(tuple(done[index].get("notes", ())))
-    if more:
-        for i, one in stream(bag_tasks.evaluate_bag, [task for _, task in more], _work(request, "fibres")):
-            trials.add(more[i][0], one)
-            lines.append(tuple(one.get("notes", ())))
-    results.warnings += counted(lines)
-    return trials
+def _of_bags(request: Request, made: Sequence[Mapping[str, Any]]) -> tuple[list[Evaluated], list[str]]:
+    """What the bags' trials show in the order of the bags, whichever was ready first, and lines on their facts.
+
+    A bag of several fibres has as many trials.
+    """
+
+    def all_of(tasks: Sequence[Mapping[str, Any]], label: str) -> list[Evaluated]:
+        found = stream(bag_tasks.evaluate_bag, tasks, _work(request, label))
+        of = {index: Evaluated.of_plain(row) for index, row in found}
+        return [of[index] for index in range(len(tasks))]
+
+    whole = all_of(made, "recordings")
+    parts = {k: bag_tasks.tasks_of_fibres(made[k], one.several) for k, one in enumerate(whole) if one.several}
+    more = [task for tasks, _ in parts.values() for task in tasks]
+    rest = iter(all_of(more, "fibres") if more else [])
+    found: list[Evaluated] = []
+    for k, one in enumerate(whole):
+        found += [next(rest) for _ in parts[k][0]] if k in parts else [one]
+    lines = [(line,) for _, line in parts.values() if line is not None]
+    return found, counted([*lines, *(tuple(one.notes) for one in found)])
 
 
 def _fibre_files(given: Sequence[str]) -> dict[str, Path] | None:
@@ -139,9 +142,7 @@ def _fibre_files(given: Sequence[str]) -> dict[str, Path] | None:
     return files or None
 
 
-def _settle_problems(request: Request, trials: Trials, tell: Callable[[str], None]) -> None:
-    for index, problem in list(duplicates(trials)):
-        trials.refuse(index, problem)
+def _tell_problems(request: Request, trials: Trials, tell: Callable[[str], None]) -> None:
     problems = trials.problem_lines()
     if problems and not (request.skip_bad and np.any(trials.good)):
         if len(problems) == 1:
@@ -149,69 +150,62 @@ def _settle_problems(request: Request, trials: Trials, tell: Callable[[str], Non
         for problem in problems:
             tell(problem)
         raise UserError(
-            f"{len(trials.problems)} of {len(trials.bag)} bags cannot be used; mend them, or leave them out with "
+            f"{len(trials.problems)} of {len(trials.found)} bags cannot be used; mend them, or leave them out with "
             "--skip-bad"
         )
     for problem in problems:
         tell(f"left out: {problem}")
 
 
-def _enhancement(request: Request, results: Results, shared: dict[str, Any]) -> None:
-    assert results.trials is not None
-    pairs = more_scores.enhancement_pairs(results.trials)
+def _enhancements(request: Request, trials: Trials, shared: dict[str, Any]) -> list[EnhancementRow]:
+    pairs = enhancement_pairs(trials)
     if not pairs:
-        return
-    made = [pairs_of_bags.enhancement_task(a, b, shared) for a, b in pairs]
-    found = run(pairs_of_bags.evaluate_enhancement, made, _work(request, "force enhancement"))
-    rows = more_scores.enhancement_rows(pairs, [dict(one) for one in found])
-    results.sections["residual_force_enhancement"] += rows
-    results.sections["enhancement_after_s"] = AFTER_S
+        return []
+    tasks = [enhancement_task(pair, shared) for pair in pairs]
+    found = run(evaluate_enhancement, tasks, _work(request, "force enhancement"))
+    return [row for pair, result in zip(pairs, found, strict=True) for row in enhancement_rows(pair, result)]
 
 
-def _paper(request: Request, results: Results, data: SrsTable, golden: Mapping[str, SrsTable]) -> None:
-    fibres = list(request.fibres) or _package_fibres(data)
-    models = gather(fibres, request.models, request.method)
+def _with_paper(request: Request, before: Results, data: SrsTable, golden: Mapping[str, SrsTable]) -> Results:
+    """The paper's grid, beside what recordings gave before."""
+    models = gather(list(request.fibres) or _package_fibres(data), request.models, request.method)
     made = grid.tasks(models, settle_s=request.settle_s)
-    found = [dict(one) for one in run(grid.simulate, made, _work(request, "paper's grid"))]
+    found = iter(zip(made, run(grid.simulate, made, _work(request, "paper's grid")), strict=True))
     tables: dict[str, SrsTable] = {}
     k_tr: dict[str, list[float]] = {}
-    start = 0
+    rates: list[RedevelopmentRow] = []
+    warnings = list(before.warnings)
     for each in models:
-        end = start + len(each.fibres) * len(grid.PCAS)
-        tables[each.name] = grid.table(each.title, list(each.fibres.values()), made[start:end], found[start:end])
-        k_tr[each.name] = []
-        problems = [one["k_tr_problem"] for one in found[start:end] if one["k_tr_problem"]]
+        of_set = [next(found) for _ in range(len(each.fibres) * len(grid.PCAS))]
+        tasks, cells = [task for task, _ in of_set], [grid.Cells.of_plain(row) for _, row in of_set]
+        tables[each.name] = grid.table(each.title, list(each.fibres.values()), tasks, cells)
+        problems = [cell.k_tr.why for cell in cells if cell.k_tr.why]
         if problems:
-            told = f"{each.name}: k_tr is left out for {len(problems)} of {end - start} fibres and pCa"
-            results.warnings.append(f"{told}, the first because: {problems[0]}")
-        for task, one in zip(made[start:end], found[start:end], strict=True):
-            if one["k_tr"] is not None:
-                row = {"fibre": task["fibre"]["name"], "trial": "simulated release", "pca": task["pca"]}
-                results.sections["k_tr"].append({**row, "of": each.name, **one["k_tr"]})
-                if task["pca"] == _MAXIMAL_PCA:
-                    k_tr[each.name].append(one["k_tr"]["k_per_s"])
-        start = end
+            told = f"{each.name}: k_tr is left out for {len(problems)} of {len(cells)} fibres and pCa"
+            warnings.append(f"{told}, the first because: {problems[0]}")
+        known = [
+            RedevelopmentRow(task["fibre"]["name"], "simulated release", task["pca"], each.name, *cell.k_tr)
+            for task, cell in zip(tasks, cells, strict=True)
+            if cell.k_tr.value is not None
+        ]
+        rates += known
+        k_tr[each.name] = [row.k_per_s for row in known if row.pca == _MAXIMAL_PCA and row.k_per_s is not None]
     sources = [Source(OURS, tables, k_tr), *golden_sources(golden, models, tables)]
-    results.models, results.tables, results.data = models, tables, data
-    if "srs" in results.sections:
-        results.sections["srs_of_recordings"] = results.sections.pop("srs")
-    results.sections |= {
-        "sets": sections.sets_section(models),
-        "srs": sections.srs_section(tables, data, models),
-        "paper": {
-            "sources": [source.name for source in sources],
-            "readings_shown": list(READINGS),
-            "comparison": compare(sources, data, models),
-            "readings": readings_table(sources, data, models, ALL_READINGS),
-            "recordings": bool(request.bags),
-        },
-    }
-    for label, table in [(MEASURED, data), *tables.items()]:
-        results.sections["force_pca"] += more_scores.force_pca_of_table(table, label)
+    curves = [row for label, table in [(MEASURED, data), *tables.items()] for row in force_pca_of_table(table, label)]
+    sections = replace(
+        before.sections,
+        sets=sets_section(models),
+        srs=srs_section(tables, data, models),
+        srs_of_recordings=before.sections.srs,
+        paper=paper_section(sources, data, models, bool(request.bags)),
+        force_pca=[*before.sections.force_pca, *curves],
+        k_tr=[*before.sections.k_tr, *rates],
+    )
+    return replace(before, sections=sections, warnings=warnings, tables=tables, data=data)
 
 
 def _package_fibres(data: SrsTable) -> list[str]:
-    known = {file.stem for folder in fibre_folders() for file in folder.glob("*.yaml")}
+    known = {file.stem for file in all_fibre_files()}
     names = [name for name in data.fibres if name in known]
     if not names:
         raise UserError(

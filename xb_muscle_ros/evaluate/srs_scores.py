@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import product
 from typing import NamedTuple
 
@@ -12,7 +13,6 @@ import numpy as np
 from xb_muscle_ros.evaluate.sets import REFERENCE_OF_AIC, ModelSet
 from xb_muscle_ros.evaluate.srs_table import UNCONDITIONED, SrsTable
 from xb_muscle_ros.scores.activation import CLASSES
-from xb_muscle_ros.scores.aic import aic
 from xb_muscle_ros.scores.conditions import (
     COMMON_AMPLITUDE_L0,
     COMMON_CLASS,
@@ -22,7 +22,8 @@ from xb_muscle_ros.scores.conditions import (
     Mask,
     sets,
 )
-from xb_muscle_ros.scores.relative import AVERAGINGS, Averaged, rmsd
+from xb_muscle_ros.scores.relative import AVERAGINGS, Averaged, Rmsd, rmsd
+from xb_muscle_ros.scores.statistics import aic
 
 
 class Reading(NamedTuple):
@@ -51,18 +52,23 @@ ALL_READINGS = tuple(
 )
 
 
-class SrsScores(NamedTuple):
-    """Of one model under one reading.
+@dataclass(frozen=True)
+class SrsScores:
+    """Relative SRS of one model under one reading.
 
     Attributes:
         rmsd: by set of conditions, ``large``, ``small`` and ``all``; None where none of its conditions was measured.
         conditions: how many of each set were compared.
         aic: over all conditions; None where it cannot be had.
+        relative_aic: AIC less the reference's; None where it cannot be had, or is not asked for.
+        profile_rmsd: along each profile; None where it was not measured.
     """
 
-    rmsd: dict[str, float | None]
-    conditions: dict[str, int]
+    rmsd: Mapping[str, float | None]
+    conditions: Mapping[str, int]
     aic: float | None
+    relative_aic: float | None = None
+    profile_rmsd: Mapping[str, float | None] = field(default_factory=dict)
 
 
 @functools.lru_cache(maxsize=1024)
@@ -85,15 +91,17 @@ def relative_at_conditions(table: SrsTable, reading: Reading, data: SrsTable | N
 
 def score(model: SrsTable, data: SrsTable, reading: Reading, fitted_parameters: int) -> SrsScores:
     """RMSD of relative SRS between the mean model and the mean measurement, and the AIC over all conditions."""
-    ours = relative_at_conditions(model, reading, data).centre
-    theirs = relative_at_conditions(data, reading, data).centre
-    found = {name: rmsd(ours, theirs, mask) for name, mask in sets(reading.large).items()}
-    _, rss, count = found["all"]
+    found = _differences(model, data, reading, sets(reading.large))
     return SrsScores(
-        {name: value if n else None for name, (value, _, n) in found.items()},
-        {name: n for name, (_, _, n) in found.items()},
-        aic(rss, count, fitted_parameters),
+        {name: each.value for name, each in found.items()},
+        {name: each.n for name, each in found.items()},
+        aic(found["all"].rss, found["all"].n, fitted_parameters),
     )
+
+
+def _differences(model: SrsTable, data: SrsTable, reading: Reading, masks: Mapping[str, Mask]) -> dict[str, Rmsd]:
+    ours, theirs = (relative_at_conditions(table, reading, data).centre for table in (model, data))
+    return {name: rmsd(ours, theirs, mask) for name, mask in masks.items()}
 
 
 def profile_masks() -> dict[str, Mask]:
@@ -112,10 +120,7 @@ def profile_masks() -> dict[str, Mask]:
 
 def profile_rmsd(model: SrsTable, data: SrsTable, reading: Reading) -> dict[str, float | None]:
     """RMSD of relative SRS along each profile; None where it was not measured."""
-    ours = relative_at_conditions(model, reading, data).centre
-    theirs = relative_at_conditions(data, reading, None).centre
-    found = {name: rmsd(ours, theirs, mask) for name, mask in profile_masks().items()}
-    return {name: value if n else None for name, (value, _, n) in found.items()}
+    return {name: each.value for name, each in _differences(model, data, reading, profile_masks()).items()}
 
 
 class AicReference(NamedTuple):

@@ -74,19 +74,17 @@ class SrsTable:
         held = self.fibres[fibre].isometric
         return nanmean(held.reshape(held.shape[0], -1).T)
 
-    def unconditioned(self, fibre: str, kind: str) -> Array:
-        """SRS of the unconditioned stretch at each pCa, shape (pca,), F0/L0; kind is one of `UNCONDITIONED`."""
-        return self._unconditioned(fibre, kind)[0]
+    def unconditioned(self, fibre: str, kind: str) -> tuple[Array, Array]:
+        """SRS of the unconditioned stretch at each pCa, and standard error (NaN where not known), shape (pca,), F0/L0.
 
-    def unconditioned_se(self, fibre: str, kind: str) -> Array:
-        """Its standard error, shape (pca,), F0/L0; NaN where not known."""
-        return self._unconditioned(fibre, kind)[1]
-
-    def _unconditioned(self, fibre: str, kind: str) -> tuple[Array, Array]:
+        Args:
+            fibre: name.
+            kind: one of `UNCONDITIONED`.
+        """
         values, errors = np.full(self.pca.size, np.nan), np.full(self.pca.size, np.nan)
         held = self.fibres[fibre]
         if kind == "conditioning":
-            column = _index(self.amplitude_l0, COMMON_AMPLITUDE_L0)
+            column = place(self.amplitude_l0, COMMON_AMPLITUDE_L0)
             if column is None:
                 return values, errors
             each = held.conditioning[:, :, column]
@@ -94,7 +92,7 @@ class SrsTable:
                 among = np.where(np.isfinite(each), held.conditioning_se[:, :, column] ** 2, 0.0).sum(axis=1)
                 errors = np.sqrt(among) / np.maximum(np.isfinite(each).sum(axis=1), 1)
             return nanmean(each.T), errors
-        column = _index(self.amplitude_l0, 0.0)
+        column = place(self.amplitude_l0, 0.0)
         if column is None:
             return values, errors
         order = np.argsort(self.recovery_s)
@@ -113,7 +111,7 @@ class SrsTable:
         by. Whether the SRS of the test stretch is itself small plays no part: means would come out too high.
         """
         held = self.fibres[fibre]
-        below, below_se = (each[:, None, None] for each in self._unconditioned(fibre, kind))
+        below, below_se = (each[:, None, None] for each in self.unconditioned(fibre, kind))
         test_se = np.full(held.test.shape, np.nan) if held.test_se is None else held.test_se
         worse: npt.NDArray[np.bool_] = (test_se >= np.abs(below)) | (below_se >= np.abs(below))
         return ~worse
@@ -122,7 +120,7 @@ class SrsTable:
         """How many relative SRS are left out for their standard errors, and of how many."""
         out, total = 0, 0
         for name, held in self.fibres.items():
-            both = np.isfinite(held.test) & np.isfinite(self.unconditioned(name, kind))[:, None, None]
+            both = np.isfinite(held.test) & np.isfinite(self.unconditioned(name, kind)[0])[:, None, None]
             total += int(np.count_nonzero(both))
             out += int(np.count_nonzero(both & ~self.sound(name, kind)))
         return out, total
@@ -132,7 +130,7 @@ class SrsTable:
         force = self.isometric_f0(fibre)
         if by is not None:
             theirs = by.isometric_f0(fibre) if fibre in by.fibres else np.full(by.pca.size, np.nan)
-            places = [_index(by.pca, pca) for pca in self.pca]
+            places = [place(by.pca, pca) for pca in self.pca]
             force = np.array([np.nan if i is None else theirs[i] for i in places])
         return activation_class(force)
 
@@ -165,31 +163,36 @@ class SrsTable:
 
 @functools.lru_cache(maxsize=256)
 def _pooled(table: SrsTable, kind: str, by: SrsTable | None) -> dict[str, ByClass]:
-    return {
-        name: by_class(
-            np.where(table.sound(name, kind), fibre.test, np.nan),
-            table.unconditioned(name, kind),
-            table.classes(name, by),
-        )
-        for name, fibre in table.fibres.items()
-    }
+    found = {}
+    for name, fibre in table.fibres.items():
+        below, below_se = table.unconditioned(name, kind)
+        test = np.where(table.sound(name, kind), fibre.test, np.nan)
+        found[name] = by_class(test, below, table.classes(name, by), fibre.test_se, below_se)
+    return found
 
 
 @functools.lru_cache(maxsize=256)
 def _places_of_conditions(table: SrsTable) -> tuple[tuple[int, int, int], ...]:
     """Condition, recovery and amplitude index of the conditions that a table's axes have."""
-    places = [(_index(table.recovery_s, c.recovery_s), _index(table.amplitude_l0, c.amplitude_l0)) for c in CONDITIONS]
+    places = [(place(table.recovery_s, c.recovery_s), place(table.amplitude_l0, c.amplitude_l0)) for c in CONDITIONS]
     return tuple((k, i, j) for k, (i, j) in enumerate(places) if i is not None and j is not None)
+
+
+def near(values: Array, level: float) -> npt.NDArray[np.bool_]:
+    """Which values are one nominal value."""
+    found: npt.NDArray[np.bool_] = np.isclose(values, level, rtol=1e-3, atol=1e-6)
+    return found
+
+
+def levels(values: Array) -> Array:
+    """Distinct nominal values, ascending, of values without NaN."""
+    return np.unique([float(f"{value:.6g}") for value in values])
 
 
 def place(axis: Array, value: float) -> int | None:
     """Where on an axis a nominal value stands; None where it does not."""
-    return _index(axis, value)
-
-
-def _index(axis: Array, value: float) -> int | None:
-    near = np.flatnonzero(np.isclose(axis, value, rtol=1e-3, atol=1e-6))
-    return int(near[0]) if near.size else None
+    found = np.flatnonzero(near(axis, value))
+    return int(found[0]) if found.size else None
 
 
 def read_table(path: Path, label: str) -> SrsTable:
@@ -248,7 +251,7 @@ def _axis(tree: Mapping[str, Any], key: str, unit: str, lower: float, upper: flo
     for value in axis:
         if not lower <= value <= upper:
             raise UserError(f"{where}: {key} {value:g} is outside {lower:g} to {upper:g}{unit}; {hint}")
-    repeated = [v for i, v in enumerate(axis) if _index(axis[:i], float(v)) is not None]
+    repeated = [v for i, v in enumerate(axis) if place(axis[:i], float(v)) is not None]
     if repeated:
         raise UserError(f"{where}: {key} {repeated[0]:g} comes twice; every level stands once on its axis")
     return axis

@@ -1,206 +1,233 @@
-"""What a run found out of its recordings, in columns: memory for 10,000 trials and six models is a few megabytes."""
+"""What an evaluation knows of its recordings: what each bag showed, and columns of numbers over all of them."""
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable
-from xb_muscle_ros.scores.conditions import AMPLITUDES_L0, CONDITIONS, RECOVERIES_S
+from xb_muscle_ros.evaluate.sets import rank
+from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable, levels
+from xb_muscle_ros.scores.conditions import AMPLITUDES_L0, RECOVERIES_S
+from xb_muscle_ros.scores.estimate import Estimate
+from xb_muscle_ros.scores.readout import ISOMETRIC, SRS_CONDITIONING, SRS_TEST
 from xb_muscle_ros.simulation.offline import one_for_all
 from xb_muscle_ros.trials.study import alike
 from xb_muscle_ros.trials.trial import Array
 
 MEASURED = "measured"
 WINDOWS = ("whole", "conditioning", "test")
-_READ_OFF = ("srs_conditioning", "srs_test", "isometric_f0")
-_ANSWERS = (*(f"{name}{end}" for name in _READ_OFF for end in ("", "_se")), "k_tr", "k_tr_se")
-MODEL_FIELDS = (*(f"rmsd_{window}" for window in WINDOWS), *_ANSWERS)
 # A table over more levels than this on an axis is one over the common conditions only.
 _MOST_LEVELS = 40
 
 
-class Trials:
-    """Results of all bags, in their order.
+@dataclass(frozen=True)
+class Facts:
+    """What grouping and pairing of trials need to know of one.
 
     Attributes:
-        bag, fibre, trial, content: one string for each bag; empty where it has a problem.
-        pca, amplitude_l0, recovery_s: shape (bags,), NaN where not known.
-        measured: quantity -> shape (bags,); F0/L0, F0, 1/s.
-        models: parameter set -> quantity -> shape (bags,), as measured, and ``rmsd_whole`` and so on, F0.
-        problems: bag -> why it cannot be used, one line.
-        unserved: fibre that no fibre file serves -> its bags, each of which has a problem.
-        warnings: lines, in order of the bags.
-        missing: parameter set -> fibres whose file lacks it.
+        path: of its bag.
+        fibre, trial: names.
+        pca, amplitude_l0, recovery_s: condition; None where not known.
+        peak_calcium_um: largest free calcium, µM.
+        final_length_l0: length change at the end, L0.
+        stretch_l0: size of the one stretch of a trial that has nothing else, L0; None for other trials.
+        moves: whether the length changes at all.
+        content: equal for recordings that hold the same samples.
     """
 
-    def __init__(self, bags: int) -> None:
-        """Nothing known yet."""
-        self._bags = bags
-        self.bag, self.fibre, self.trial, self.content = ([""] * bags for _ in range(4))
-        self.pca, self.amplitude_l0, self.recovery_s = (np.full(bags, np.nan) for _ in range(3))
-        self.measured: dict[str, Array] = {name: np.full(bags, np.nan) for name in _ANSWERS}
-        self.models: dict[str, dict[str, Array]] = {}
-        self.problems: dict[str, str] = {}
-        self.unserved: dict[str, list[str]] = {}
-        self.missing: dict[str, set[str]] = {}
-        self._warnings: dict[int, list[str]] = {}
-        self._pushes: dict[str, dict[int, str]] = {}
-        self._why: dict[int, dict[str, dict[str, str]]] = {}
-        self._codes: dict[str, int] = {}
-        self._code = np.full(bags, -1)
-        self._shapes: dict[int, dict[str, Any]] = {}
+    path: str
+    fibre: str
+    trial: str
+    pca: float | None
+    amplitude_l0: float | None
+    recovery_s: float | None
+    peak_calcium_um: float
+    final_length_l0: float
+    stretch_l0: float | None
+    moves: bool
+    content: str
 
-    def add(self, index: int, found: Mapping[str, Any]) -> None:
-        """Keep what `evaluate_bag` found of the bag at a place."""
-        self.bag[index] = found["bag"]
-        if "problem" in found:
-            self.problems[found["bag"]] = found["problem"]
-            if "unserved" in found:
-                self.unserved.setdefault(found["unserved"], []).append(found["bag"])
-            return
-        facts = found["trial"]
-        self.fibre[index], self.trial[index], self.content[index] = facts["fibre"], facts["trial"], facts["content"]
-        self._code[index] = self._codes.setdefault(facts["fibre"], len(self._codes))
-        self.pca[index] = _number(facts["pca"])
-        self.amplitude_l0[index] = _number(facts["amplitude_l0"])
-        reference = facts["amplitude_l0"] == 0.0 and facts["recovery_s"] is None
-        self.recovery_s[index] = CONDITIONS[0].recovery_s if reference else _number(facts["recovery_s"])
-        if facts["stretch_l0"] is not None or not facts["moves"]:
-            # What residual force enhancement is looked for in; most trials are of another kind.
-            self._shapes[index] = dict(facts)
-        _put(self.measured, index, found["measured"])
-        for name, values in found["models"].items():
-            if name not in self.models:
-                self.models[name] = {field: np.full(self._bags, np.nan) for field in MODEL_FIELDS}
-            _put(self.models[name], index, values)
-            for window in WINDOWS:
-                self.models[name][f"rmsd_{window}"][index] = _number(values["rmsd_f0"][window])
-            if values.get("pushes"):
-                self._pushes.setdefault(name, {})[index] = values["pushes"]
-        for name in found["missing"]:
-            self.missing.setdefault(name, set()).add(facts["fibre"])
-        if found["warnings"]:
-            self._warnings[index] = list(found["warnings"])
-        told = {name: each["why"] for name, each in {MEASURED: found["measured"], **found["models"]}.items()}
-        if any(told.values()):
-            self._why[index] = {name: dict(why) for name, why in told.items()}
+
+@dataclass(frozen=True)
+class Evaluated:
+    """What a bag, or one fibre's trial in it, showed.
+
+    Attributes:
+        bag: as the user named it.
+        several: fibres of a bag that has more than one, where the task does not choose; then nothing else.
+        problem: why it cannot be used, one line; then nothing else but `unserved`.
+        unserved: the fibre that no fibre file serves.
+        facts: of the trial.
+        scores: what `MEASURED` force and each model show, by quantity: ``rmsd_whole``, ``rmsd_conditioning`` and
+            ``rmsd_test`` (F0), the keys of `scores.readout.TEXT` (F0/L0, F0) and ``k_tr`` (1/s).
+        pushes: models that push where a muscle would be slack, and a line on each.
+        missing: models without parameter set.
+        warnings: of the reader.
+        notes: lines on facts that are not the bag's own.
+    """
+
+    bag: str
+    several: Sequence[str] = ()
+    problem: str = ""
+    unserved: str = ""
+    facts: Facts | None = None
+    scores: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
+    pushes: Mapping[str, str] = field(default_factory=dict)
+    missing: Sequence[str] = ()
+    warnings: Sequence[str] = ()
+    notes: Sequence[str] = ()
+
+    @classmethod
+    def of_plain(cls, row: Mapping[str, Any]) -> Evaluated:
+        """From plain data, as `evaluate_bag` gives it and JSON gives it back."""
+        facts = None if row["facts"] is None else Facts(**row["facts"])
+        scores = {of: {name: Estimate(*each) for name, each in held.items()} for of, held in row["scores"].items()}
+        return cls(**{**row, "facts": facts, "scores": scores})
+
+
+class Trials:
+    """All bags in their order; a trial that comes a second time, by name or by content, is a problem.
+
+    Attributes:
+        found: what each bag showed.
+        facts: of each trial; None for bags that cannot be used, shape (bags,).
+        good: which bags can be used, shape (bags,).
+        problems: bag -> why it cannot be used, one line.
+        fibres: names, sorted.
+        models: parameter sets that were compared, simplest first.
+        pca, amplitude_l0, recovery_s: shape (bags,), NaN where not known.
+    """
+
+    def __init__(self, found: Sequence[Evaluated]) -> None:
+        """Take what `evaluate_bag` found, in the order of the bags."""
+        self.found = list(found)
+        self.problems = {each.bag: each.problem for each in found if each.problem}
+        again = dict(_duplicates(found))
+        self.problems |= {found[index].bag: problem for index, problem in again.items()}
+        self.facts = [None if index in again else each.facts for index, each in enumerate(found)]
+        self.good = np.array([facts is not None for facts in self.facts], dtype=bool)
+        self._fibre = np.array(["" if facts is None else facts.fibre for facts in self.facts])
+        self.fibres = sorted({facts.fibre for facts in self.facts if facts is not None})
+        models = {name for each in found for name in each.scores} - {MEASURED}
+        self.models = sorted(models, key=lambda name: (rank(name), name))
+        self.pca, self.amplitude_l0, self.recovery_s = (
+            _numbers(None if facts is None else getattr(facts, name) for facts in self.facts)
+            for name in ("pca", "amplitude_l0", "recovery_s")
+        )
+
+    @functools.cache  # noqa: B019 - there is one of these in a run
+    def column(self, of: str, quantity: str) -> tuple[Array, Array]:
+        """Values and standard errors of a quantity, measured or by a model, shape (bags,); NaN where there is none."""
+        each = [one.scores.get(of, {}).get(quantity, Estimate(None)) for one in self.found]
+        return _numbers(one.value for one in each), _numbers(one.se for one in each)
+
+    def usable(self) -> Iterator[tuple[int, Facts]]:
+        """Places and facts of the trials that can be used."""
+        return ((index, facts) for index, facts in enumerate(self.facts) if facts is not None)
+
+    def is_of(self, fibre: str) -> npt.NDArray[np.bool_]:
+        """Which bags are of a fibre, shape (bags,)."""
+        mine: npt.NDArray[np.bool_] = self._fibre == fibre
+        return mine
+
+    def why(self, index: int, of: str) -> dict[str, str]:
+        """What a trial lacks that could be expected, measured or by a model, and why."""
+        return {name: each.why for name, each in self.found[index].scores.get(of, {}).items() if each.why}
 
     @property
-    def good(self) -> npt.NDArray[np.bool_]:
-        """Which bags could be used, shape (bags,)."""
-        usable: npt.NDArray[np.bool_] = self._code >= 0
-        return usable
-
-    @property
-    def fibres(self) -> list[str]:
-        """Names of fibres, sorted."""
-        return sorted({fibre for fibre in self.fibre if fibre})
+    def missing(self) -> dict[str, list[str]]:
+        """Parameter sets, and the fibres whose file lacks them."""
+        fibres: dict[str, set[str]] = {}
+        for each in self.found:
+            for name in each.missing:
+                fibres.setdefault(name, set()).add("" if each.facts is None else each.facts.fibre)
+        return {name: sorted(of) for name, of in sorted(fibres.items())}
 
     @property
     def warnings(self) -> list[str]:
         """All warnings in order of the bags, those alike in one; then one for each model that pushes."""
-        lines = alike(line for index in sorted(self._warnings) for line in self._warnings[index])
-        for told in self._pushes.values():
-            lines += one_for_all([told[index] for index in sorted(told) if self._code[index] >= 0])
+        lines = alike(line for each in self.found for line in each.warnings)
+        pushing = dict.fromkeys(name for each in self.found for name in each.pushes)
+        for name in pushing:
+            lines += one_for_all([self.found[i].pushes[name] for i, _ in self.usable() if name in self.found[i].pushes])
         return lines
-
-    def why(self, index: int, of: str) -> dict[str, str]:
-        """What a trial lacks that could be expected, measured or by a model, and why."""
-        return self._why.get(index, {}).get(of, {})
-
-    def refuse(self, index: int, problem: str) -> None:
-        """Take a bag out."""
-        self.problems[self.bag[index]] = problem
-        self.fibre[index] = ""
-        self._code[index] = -1
-        self._shapes.pop(index, None)
 
     def problem_lines(self) -> list[str]:
         """A line for each bag that cannot be used, one alone for all whose fibre has no file."""
-        shared = {fibre: sorted(bags) for fibre, bags in sorted(self.unserved.items()) if len(bags) > 1}
-        alike = {bag for bags in shared.values() for bag in bags}
-        lines = [self.problems[bag] for bag in sorted(self.problems) if bag not in alike]
+        unserved: dict[str, list[str]] = {}
+        for each in self.found:
+            if each.unserved:
+                unserved.setdefault(each.unserved, []).append(each.bag)
+        shared = {fibre: sorted(bags) for fibre, bags in sorted(unserved.items()) if len(bags) > 1}
+        in_one = {bag for bags in shared.values() for bag in bags}
+        lines = [self.problems[bag] for bag in sorted(self.problems) if bag not in in_one]
         for bags in shared.values():
             why = self.problems[bags[0]].removeprefix(f"bag {bags[0]}: ")
             lines.append(f"{len(bags)} bags, from {bags[0]} to {bags[-1]}: {why}")
         return lines
 
-    def shapes(self) -> Iterator[dict[str, Any]]:
-        """Facts of the trials that are isometric throughout or have one stretch alone, in order of the bags."""
-        return (self._shapes[index] for index in sorted(self._shapes))
 
-    def is_of(self, fibre: str) -> npt.NDArray[np.bool_]:
-        """Which bags are of a fibre, shape (bags,)."""
-        mine: npt.NDArray[np.bool_] = self._code == self._codes.get(fibre, -2)
-        return mine
-
-
-def duplicates(trials: Trials) -> Iterator[tuple[int, str]]:
-    """Bags that come a second time, by name or by content: place and what is wrong."""
+def _duplicates(found: Sequence[Evaluated]) -> Iterator[tuple[int, str]]:
     names: dict[tuple[str, str], int] = {}
     contents: dict[str, int] = {}
-    for i in np.flatnonzero(trials.good).tolist():
-        name = (trials.fibre[i], trials.trial[i])
-        first = names.setdefault(name, i)
-        if first != i:
-            told = f"trial {name[1]} of fibre {name[0]} is in {trials.bag[first]} already"
-            yield i, f"bag {trials.bag[i]}: {told}; give every trial once"
+    for i, each in enumerate(found):
+        if each.facts is None:
             continue
-        first = contents.setdefault(trials.content[i], i)
+        fibre, trial = each.facts.fibre, each.facts.trial
+        first = names.setdefault((fibre, trial), i)
         if first != i:
-            yield i, f"bag {trials.bag[i]} holds the same samples as {trials.bag[first]}; give every trial once"
+            told = f"trial {trial} of fibre {fibre} is in {found[first].bag} already"
+            yield i, f"bag {each.bag}: {told}; give every trial once"
+            continue
+        first = contents.setdefault(each.facts.content, i)
+        if first != i:
+            yield i, f"bag {each.bag} holds the same samples as {found[first].bag}; give every trial once"
 
 
-def srs_table(trials: Trials, model: str | None, label: str) -> SrsTable | None:
+def srs_table(trials: Trials, of: str, label: str) -> SrsTable | None:
     """SRS and isometric force of the trials of the paper's protocol; repeats of a condition are averaged.
 
     Args:
         trials: all.
-        model: parameter set; None: what was measured.
+        of: parameter set, or `MEASURED`.
         label: of the table.
 
     Returns:
         None where no trial has pCa, amplitude and recovery time.
     """
-    values = trials.measured if model is None else trials.models[model]
-    used = np.isfinite(trials.pca) & np.isfinite(trials.amplitude_l0) & np.isfinite(trials.recovery_s)
-    used &= trials.good
+    conditions = (trials.pca, trials.recovery_s, trials.amplitude_l0)
+    used = trials.good & np.all(np.isfinite(conditions), axis=0)
     if not np.any(used):
         return None
-    pca = _levels(trials.pca[used], None)
-    recovery = _levels(trials.recovery_s[used], RECOVERIES_S)
-    amplitude = _levels(trials.amplitude_l0[used], (0.0, *AMPLITUDES_L0))
-    places = [
-        _places(pca, trials.pca),
-        _places(recovery, trials.recovery_s),
-        _places(amplitude, trials.amplitude_l0),
-    ]
+    common = (None, RECOVERIES_S, (0.0, *AMPLITUDES_L0))
+    axes = [_axis(values[used], few) for values, few in zip(conditions, common, strict=True)]
+    places = [_places(axis, values) for axis, values in zip(axes, conditions, strict=True)]
     used &= np.all([p >= 0 for p in places], axis=0)
-    shape = (pca.size, recovery.size, amplitude.size)
+    shape = tuple(axis.size for axis in axes)
     fibres, repeats_left_out = {}, 0
     for name in trials.fibres:
         mine = used & trials.is_of(name)
         cell = tuple(p[mine] for p in places)
         (test, test_se, out), (conditioning, conditioning_se, _), (isometric, _, _) = (
-            _mean_in_cells(values[q][mine], values[f"{q}_se"][mine], cell, shape)
-            for q in ("srs_test", "srs_conditioning", "isometric_f0")
+            _mean_in_cells(values[mine], errors[mine], cell, shape)
+            for values, errors in (trials.column(of, name) for name in (SRS_TEST, SRS_CONDITIONING, ISOMETRIC))
         )
         fibres[name] = FibreSrs(test, conditioning, isometric, test_se, conditioning_se)
         repeats_left_out += out
-    return SrsTable(label, pca, recovery, amplitude, fibres, repeats_left_out)
+    pca, recovery_s, amplitude_l0 = axes
+    return SrsTable(label, pca, recovery_s, amplitude_l0, fibres, repeats_left_out)
 
 
-def _levels(values: Array, common: tuple[float, ...] | None) -> Array:
+def _axis(values: Array, common: tuple[float, ...] | None) -> Array:
     """Distinct nominal values; the common ones alone where there are too many."""
-    levels = np.unique([float(f"{value:.6g}") for value in values])
-    if common is not None and levels.size > _MOST_LEVELS:
-        return np.array(common)
-    return levels
+    found = levels(values)
+    return np.array(common) if common is not None and found.size > _MOST_LEVELS else found
 
 
 def _places(axis: Array, values: Array) -> npt.NDArray[np.int64]:
@@ -234,13 +261,5 @@ def _mean_in_cells(
     return total / divisor, np.sqrt(squares) / divisor, int(np.count_nonzero(~kept))
 
 
-def _put(columns: dict[str, Array], index: int, values: Mapping[str, Any]) -> None:
-    for name in _READ_OFF:
-        columns[name][index], columns[f"{name}_se"][index] = _number(values[name]), _number(values[f"{name}_se"])
-    if values["k_tr"] is not None:
-        columns["k_tr"][index] = values["k_tr"]["k_per_s"]
-        columns["k_tr_se"][index] = _number(values["k_tr"]["se_per_s"])
-
-
-def _number(value: float | None) -> float:
-    return math.nan if value is None else float(value)
+def _numbers(values: Iterable[float | None]) -> Array:
+    return np.array([math.nan if value is None else value for value in values], dtype=np.float64)

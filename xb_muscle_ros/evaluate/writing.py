@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from xb_muscle_ros.evaluate import sections
+from xb_muscle_ros.evaluate import csv_rows
+from xb_muscle_ros.evaluate.force_scores import force_rows
 from xb_muscle_ros.evaluate.report import write_up
-from xb_muscle_ros.evaluate.results import Request, Results
-from xb_muscle_ros.evaluate.tables_text import write_csv
+from xb_muscle_ros.evaluate.request import Request
+from xb_muscle_ros.evaluate.results import Results
 from xb_muscle_ros.evaluate.trials import MEASURED
-from xb_muscle_ros.files import matching, write_text
+from xb_muscle_ros.files import matching, write_json, write_text
+from xb_muscle_ros.tables import write_csv
 from xb_muscle_ros.trials.bag_files import remove_results
+
+_FIGURES = ("force_rmsd", "relative_srs", "srs_surfaces")
 
 
 def older_results(out: Path) -> list[Path]:
     """What an older evaluation left in a folder; not its journal, which holds what is computed already."""
     tables = ("trials", "force_rmsd", "relative_srs", "srs_cells", "srs_rmsd")
-    figures = ("force_rmsd", "relative_srs", "srs_surfaces")
-    return matching(out, r"evaluate\.(json|md)", rf"({'|'.join(tables)})\.csv", rf"({'|'.join(figures)})\.(png|pdf)")
+    return matching(out, r"evaluate\.(json|md)", rf"({'|'.join(tables)})\.csv", rf"({'|'.join(_FIGURES)})\.(png|pdf)")
 
 
 def write(request: Request, results: Results) -> list[Path]:
@@ -32,25 +34,21 @@ def write(request: Request, results: Results) -> list[Path]:
 def write_tables(out: Path, results: Results) -> list[Path]:
     """Write ``evaluate.json``, ``evaluate.md`` and the CSV files."""
     found = results.sections
-    write_text(out / "evaluate.json", json.dumps(found, indent=1, allow_nan=False) + "\n")
+    write_json(out / "evaluate.json", found)
     write_text(out / "evaluate.md", write_up(found))
-    made = ["evaluate.json", "evaluate.md"]
-
-    def table(name: str, rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> None:
-        write_csv(out / name, rows, columns)
-        made.append(name)
-
+    tables: dict[str, Iterable[Mapping[str, Any]]] = {}
     if results.trials is not None:
-        table("trials.csv", sections.trial_rows(results.trials), sections.TRIAL_COLUMNS)
-    if "force_rmsd" in found and found["force_rmsd"]["overall"]:
-        table("force_rmsd.csv", sections.force_rows(found["force_rmsd"]), sections.FORCE_COLUMNS)
+        tables["trials.csv"] = csv_rows.trial_rows(results.trials)
+    if found.force_rmsd is not None and found.force_rmsd.overall:
+        tables["force_rmsd.csv"] = force_rows(found.force_rmsd)
     if results.data is not None:
-        table("relative_srs.csv", sections.relative_rows(results.tables, results.data), sections.RELATIVE_COLUMNS)
-        cells = {MEASURED: results.data, **results.tables}
-        table("srs_cells.csv", sections.cell_rows(cells), sections.CELL_COLUMNS)
-    if "paper" in found:
-        table("srs_rmsd.csv", found["paper"]["readings"], list(found["paper"]["readings"][0]))
-    return [out / name for name in made]
+        tables["relative_srs.csv"] = csv_rows.relative_rows(results.tables, results.data)
+        tables["srs_cells.csv"] = csv_rows.cell_rows({MEASURED: results.data, **results.tables})
+    if found.paper is not None:
+        tables["srs_rmsd.csv"] = (row.as_row() for row in found.paper.readings)
+    for name, rows in tables.items():
+        write_csv(out / name, rows, csv_rows.COLUMNS.get(name, ()))
+    return [out / name for name in ("evaluate.json", "evaluate.md", *tables)]
 
 
 def draw_figures(out: Path, results: Results) -> list[Path]:
@@ -59,13 +57,12 @@ def draw_figures(out: Path, results: Results) -> list[Path]:
     from xb_muscle_ros.evaluate.figures.srs import draw_srs
     from xb_muscle_ros.evaluate.figures.surfaces import draw_surfaces
 
-    made = []
-    force = results.sections.get("force_rmsd", {})
-    if force.get("overall"):
-        made.append(out / "force_rmsd.png")
-        draw_force(made[-1], force)
-    if results.data is not None and results.tables:
-        profiles, surfaces = out / "relative_srs.png", out / "srs_surfaces.png"
-        made += [profiles] if draw_srs(profiles, results.data, results.tables, results.sections["srs"]) else []
+    force, profiles, surfaces = (out / f"{name}.png" for name in _FIGURES)
+    made, found = [], results.sections
+    if found.force_rmsd is not None and found.force_rmsd.overall:
+        draw_force(force, found.force_rmsd)
+        made.append(force)
+    if results.data is not None and results.tables and found.srs is not None:
+        made += [profiles] if draw_srs(profiles, results.data, results.tables, found.srs) else []
         made += [surfaces] if draw_surfaces(surfaces, results.data, results.tables) else []
     return made

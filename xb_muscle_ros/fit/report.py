@@ -14,7 +14,6 @@ from scipy.stats import chi2
 
 from xb_muscle_ros import __version__
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import write_text
 from xb_muscle_ros.fit.calibration import calibrated_force, own_faults
 from xb_muscle_ros.fit.cautions import cautions
 from xb_muscle_ros.fit.coordinates import Coordinate
@@ -233,10 +232,3 @@ def write_fitted(path: Path, fitted: Fitted, found: Mapping[str, Any]) -> Fibre:
 def _faults(fitted: Fitted) -> list[tuple[Coordinate, float]]:
     pairs = zip(fitted.problem.coordinates, fitted.best.z.tolist(), strict=True)
     return [(c, z) for c, z in pairs if c.group is not None]
-
-
-def write_json(path: Path, found: Mapping[str, Any]) -> None:
-    """Write ``fit.json``."""
-    import json
-
-    write_text(path, json.dumps(found, indent=1, allow_nan=False) + "\n")

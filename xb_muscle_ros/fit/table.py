@@ -3,58 +3,66 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from xb_muscle_ros.fit.ends import PRIOR, closes
 from xb_muscle_ros.fit.ordinary import fitted_line, unit_of
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS, Scope
+from xb_muscle_ros.tables import aligned, number
 
 # Beyond so many trials their faults have one line of the table.
 _MANY = 4
 
 
 def table(found: Mapping[str, Any]) -> str:
-    """Lines for a terminal."""
-    lines = [f"{'parameter':24s} {'start':>11s} {'fitted':>11s}  {'interval':25s} unit"]
-    kinds = Counter(row["name"] for row in found["parameters"])
+    """Parameters, what was held, and trials, as lines for a terminal."""
+    head = ("parameter", "start", "fitted", "interval", "unit")
+    parameters = aligned(head, list(_parameter_rows(found["parameters"])), left=(0, 3, 4), rule=False)
+    trials = aligned(("trial", "", "before", "after", "RMSD, % F0"), _trial_rows(found), left=(0, 1, 4), rule=False)
+    return "\n".join([parameters, *_held_lines(found), "", trials])
+
+
+def _parameter_rows(parameters: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
+    kinds = Counter(row["name"] for row in parameters)
     listed: set[str] = set()
-    for row in found["parameters"]:
-        if row["group"] is not None and kinds[row["name"]] > _MANY and ARTEFACTS[row["name"]].scope is Scope.TRIAL:
-            if row["name"] not in listed:
-                values = [r["value"] for r in found["parameters"] if r["name"] == row["name"]]
+    for row in parameters:
+        name = row["name"]
+        if row["group"] is not None and kinds[name] > _MANY and ARTEFACTS[name].scope is Scope.TRIAL:
+            if name not in listed:
+                values = [r["value"] for r in parameters if r["name"] == name]
                 spread = f"{min(values):.4g} to {max(values):.4g}"
-                lines.append(
-                    f"{row['name']:24s} {row['start']:11.5g} {spread:>25s}  of {len(values)} trials {row['unit']}"
-                )
-            listed.add(row["name"])
+                yield [name, f"{row['start']:.5g}", "", f"{spread} of {len(values)} trials", row["unit"]]
+            listed.add(name)
             continue
-        label = f"{row['name']}[{row['group']}]" if row["group"] else row["name"]
+        label = f"{name}[{row['group']}]" if row["group"] else name
         interval = f"{_end(row, 0)} to {_end(row, 1)}"
-        lines.append(f"{label:24s} {row['start']:11.5g} {row['value']:11.5g}  {interval:25s} {row['unit']}")
-    lines += _held_lines(found)
-    lines += ["", f"{'trial':40s} {'':9s} {'before':>8s} {'after':>8s}  RMSD, % F0"]
+        yield [label, f"{row['start']:.5g}", f"{row['value']:.5g}", interval, row["unit"]]
+
+
+def _trial_rows(found: Mapping[str, Any]) -> list[list[str]]:
+    rows = []
     for row in found["trials"]:
         what = "held out" if row["held_out"] else "training" if row["weight"] > 0.0 else "no weight"
-        line = f"{row['trial']:40s} {what:9s} {_percent(row['rmsd_before_f0'])} {_percent(row['rmsd_f0'])}"
+        told = ""
         if row.get("own_faults"):
             own = ", ".join(f"{name} {value:+.3g}{unit_of(name)}" for name, value in row["own_faults"].items())
             both = _both(row["rmsd_before_calibrated_f0"], row["rmsd_calibrated_f0"])
-            line += f"; with what its isometric force tells: {both} ({own})"
-        lines.append(line)
+            told = f"with what its isometric force tells: {both} ({own})"
+        rows.append([row["trial"], what, _percent(row["rmsd_before_f0"]), _percent(row["rmsd_f0"]), told])
     for key, what in (("train_rmsd_f0", "training"), ("heldout_rmsd_f0", "held out")):
         if found[key] is not None:
-            lines.append(f"{'all':40s} {what:9s} {_percent(found['before'][key])} {_percent(found[key])}")
+            rows.append(["all", what, _percent(found["before"][key]), _percent(found[key]), ""])
     if found["heldout_rmsd_calibrated_f0"] is not None:
         key = "heldout_rmsd_calibrated_f0"
         count = sum(bool(row.get("own_faults")) for row in found["trials"])
         both = _both(found["before"][key], found[key])
-        lines[-1] += f"; with what isometric force tells of {count} of them: {both}"
-    return "\n".join(lines)
+        rows[-1][-1] = f"with what isometric force tells of {count} of them: {both}"
+    return rows
 
 
 def _both(before: float | None, after: float | None) -> str:
-    return f"{_percent(before).strip()} before, {_percent(after).strip()} after"
+    return f"{_percent(before)} before, {_percent(after)} after"
 
 
 def _end(row: Mapping[str, Any], side: int) -> str:
@@ -83,4 +91,4 @@ def _held_lines(found: Mapping[str, Any]) -> list[str]:
 
 
 def _percent(value: float | None) -> str:
-    return f"{'-':>8s}" if value is None else f"{100.0 * value:8.3f}"
+    return number(value, ".3f", 100.0)

@@ -12,7 +12,7 @@ import numpy as np
 
 from xb_muscle_ros import __version__
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import write_text
+from xb_muscle_ros.files import write_json
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.node.rules import Scale
@@ -53,7 +53,7 @@ def save_state(state_file: str, mode: str, stepping: Stepping) -> str:
     alone = len(trees) == 1
     tree = {"format": FORMATS[not alone], "version": __version__, **(trees[0] if alone else {"fibres": trees})}
     try:
-        write_text(path, json.dumps(tree, indent=1) + "\n")
+        write_json(path, tree)
     except (OSError, ValueError) as error:
         raise UserError(f"state file {path} cannot be written: {error}; set parameter 'state_file'") from error
     if alone:

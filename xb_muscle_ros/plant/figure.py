@@ -66,7 +66,7 @@ def draw_loop(path: Path, traces: Sequence[Trace], title: str) -> None:
         made.legend(
             handles, names, loc="outside upper center", ncols=columns, frameon=False, title=title, handlelength=3.2
         )
-        _table(made.add_subplot(grid[2, :]), rows(traces))
+        _table(made.add_subplot(grid[2, :]), *rows(traces))
         save(made, path)
 
 
@@ -91,10 +91,10 @@ def _load_line(panels: list[list[Any]], trace: Trace) -> None:
         axes.plot((0.0, right), (0.0, slope * right), color="black", linewidth=0.7, label="m·g·h", zorder=1.0)
 
 
-def _table(axes: Any, text: list[list[str]]) -> None:
+def _table(axes: Any, head: Sequence[str], cells: Sequence[Sequence[str]]) -> None:
     axes.set_axis_off()
-    heads = [head.replace(" [", "\n[") if head.count(" ") < 3 else head.replace(" ", "\n", 1) for head in text[0]]
-    made = axes.table(cellText=text[1:], colLabels=heads, cellLoc="center", loc="center", edges="horizontal")
+    heads = [name.replace(" [", "\n[") if name.count(" ") < 3 else name.replace(" ", "\n", 1) for name in head]
+    made = axes.table(cellText=cells, colLabels=heads, cellLoc="center", loc="center", edges="horizontal")
     made.auto_set_font_size(False)
     made.set_fontsize(6.5)
     made.auto_set_column_width(list(range(len(heads))))

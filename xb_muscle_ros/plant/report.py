@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.files import write_text
+from xb_muscle_ros.files import write_json
 from xb_muscle_ros.plant.loop import Trace
+from xb_muscle_ros.tables import Filled, aligned, number, write_csv
 
 STIFFNESS_AT_S = (0.02, 0.05, 0.1)
 _FIRST_S = 0.1
@@ -83,48 +81,41 @@ def knee_numbers(trace: Trace) -> dict[str, float | None]:
 
 _COLUMNS = {
     "ankle": (
-        ("force_at_rest_n", "force [N]", "{:.0f}"),
-        ("force_rise_20ms_n", "rise 20 ms [N]", "{:.1f}"),
-        ("force_rise_50ms_n", "50 ms [N]", "{:.1f}"),
-        ("peak_force_rise_100ms_n", "peak to 100 ms [N]", "{:.1f}"),
-        ("stiffness_20ms_mgh", "stiffness 20 ms [mgh]", "{:.2f}"),
-        ("stiffness_50ms_mgh", "50 ms [mgh]", "{:.2f}"),
-        ("stiffness_100ms_mgh", "100 ms [mgh]", "{:.2f}"),
-        ("sway_100ms_deg", "sway 100 ms [deg]", "{:.3f}"),
-        ("sway_300ms_deg", "300 ms [deg]", "{:.3f}"),
+        ("force_at_rest_n", "force [N]", ".0f"),
+        ("force_rise_20ms_n", "rise 20 ms [N]", ".1f"),
+        ("force_rise_50ms_n", "50 ms [N]", ".1f"),
+        ("peak_force_rise_100ms_n", "peak to 100 ms [N]", ".1f"),
+        ("stiffness_20ms_mgh", "stiffness 20 ms [mgh]", ".2f"),
+        ("stiffness_50ms_mgh", "50 ms [mgh]", ".2f"),
+        ("stiffness_100ms_mgh", "100 ms [mgh]", ".2f"),
+        ("sway_100ms_deg", "sway 100 ms [deg]", ".3f"),
+        ("sway_300ms_deg", "300 ms [deg]", ".3f"),
     ),
     "knee": (
-        ("force_at_rest_n", "force [N]", "{:.0f}"),
-        ("peak_force_rise_100ms_n", "peak rise to 100 ms [N]", "{:.1f}"),
-        ("angle_100ms_deg", "angle 100 ms [deg]", "{:.2f}"),
-        ("angle_300ms_deg", "300 ms [deg]", "{:.2f}"),
-        ("first_swing_excursion_deg", "first swing [deg]", "{:.1f}"),
-        ("first_swing_s", "lasts [s]", "{:.2f}"),
-        ("last_angle_deg", "last angle [deg]", "{:.1f}"),
+        ("force_at_rest_n", "force [N]", ".0f"),
+        ("peak_force_rise_100ms_n", "peak rise to 100 ms [N]", ".1f"),
+        ("angle_100ms_deg", "angle 100 ms [deg]", ".2f"),
+        ("angle_300ms_deg", "300 ms [deg]", ".2f"),
+        ("first_swing_excursion_deg", "first swing [deg]", ".1f"),
+        ("first_swing_s", "lasts [s]", ".2f"),
+        ("last_angle_deg", "last angle [deg]", ".1f"),
     ),
 }
 
 
-def rows(traces: Sequence[Trace]) -> list[list[str]]:
-    """The main numbers as text, a heading and a row per run; a dash where there is nothing to say."""
+def rows(traces: Sequence[Trace]) -> Filled:
+    """The main numbers as text: heads, and a row for each run."""
     columns = _COLUMNS[traces[0].scene]
-    made = [["model", *(head for _, head, _ in columns)]]
+    made = []
     for trace in traces:
         found = numbers(trace)
-        cells = [(form, found[key]) for key, _, form in columns]
-        made.append([trace.label, *("–" if value is None else form.format(value) for form, value in cells)])
-    return made
+        made.append([trace.label, *(number(found[key], form) for key, _, form in columns)])
+    return ["model", *(head for _, head, _ in columns)], made
 
 
 def table(traces: Sequence[Trace]) -> str:
     """`rows` as aligned text."""
-    text = rows(traces)
-    widths = [max(len(row[i]) for row in text) for i in range(len(text[0]))]
-    lines = [
-        "  ".join(cell.rjust(w) if i else cell.ljust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True)))
-        for row in text
-    ]
-    return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
+    return aligned(*rows(traces))
 
 
 def write(out: Path, traces: Sequence[Trace], settings: dict[str, object]) -> list[Path]:
@@ -142,21 +133,16 @@ def write(out: Path, traces: Sequence[Trace], settings: dict[str, object]) -> li
         for trace in traces
     ]
     tree = {"scene": traces[0].scene, **settings, "load_nm_per_rad": traces[0].load_nm_per_rad, "runs": runs}
-    write_text(out / "loop.json", json.dumps(tree, indent=1, allow_nan=False) + "\n")
-    write_text(out / "loop.csv", _csv(traces))
+    write_json(out / "loop.json", tree)
+    write_csv(out / "loop.csv", _samples(traces))
     return [out / "loop.json", out / "loop.csv"]
 
 
-def _csv(traces: Sequence[Trace]) -> str:
+def _samples(traces: Sequence[Trace]) -> Iterator[dict[str, Any]]:
     """Long format: a row for each run and tick."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    muscles = traces[0].muscles
-    columns = [f"{m}.{what}" for what in ("force_n", "length_change_l0") for m in muscles]
-    writer.writerow(["model", "time_s", "angle_rad", "torque_nm", *columns])
+    columns = [f"{m}.{what}" for what in ("force_n", "length_change_l0") for m in traces[0].muscles]
+    names = ["model", "time_s", "angle_rad", "torque_nm", *columns]
     for trace in traces:
-        data = np.column_stack(
-            (trace.time_s, trace.angle_rad, trace.torque_nm, trace.force_n, trace.length_change_l0)
-        ).tolist()
-        writer.writerows([trace.label, *row] for row in data)
-    return text.getvalue()
+        data = (trace.time_s, trace.angle_rad, trace.torque_nm, trace.force_n, trace.length_change_l0)
+        for row in np.column_stack(data).tolist():
+            yield dict(zip(names, [trace.label, *row], strict=True))

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import refuse_older, write_text
+from xb_muscle_ros.files import refuse_older, write_json
 from xb_muscle_ros.prove.sealing import (
     BENCHMARK,
     COMPOSITES,
@@ -93,8 +93,7 @@ def _refuse_within(key: Path, out: Path) -> None:
 def seal(out: Path, key: Path, seed: int, entries: list[Any], about: str, method: str, kind: str = SINGLES) -> str:
     """Write the key and the benchmark's public description; returns the key's SHA-256."""
     salt = hashlib.sha256(f"salt of the key, seed {seed}".encode()).hexdigest()
-    content = {"version": VERSION, "kind": kind, "salt": salt, "seed": seed, "cases": entries}
-    write_text(key, json.dumps(content, indent=1) + "\n")
+    write_json(key, {"version": VERSION, "kind": kind, "salt": salt, "seed": seed, "cases": entries})
     sealed = digest(key)
     public = {
         "version": VERSION,
@@ -104,7 +103,7 @@ def seal(out: Path, key: Path, seed: int, entries: list[Any], about: str, method
         "cases": [entry["case"] for entry in entries],
         "key_sha256": sealed,
     }
-    write_text(out / BENCHMARK, json.dumps(public, indent=1) + "\n")
+    write_json(out / BENCHMARK, public)
     return sealed
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 import time
 from collections.abc import Mapping
@@ -12,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import matching, refuse_older, write_text
+from xb_muscle_ros.files import matching, refuse_older, write_json
 from xb_muscle_ros.prove.answers import row_of
 from xb_muscle_ros.prove.sealing import BENCHMARK, load_benchmark
 from xb_muscle_ros.trials.bag_files import remove_results
@@ -45,8 +44,8 @@ def run(folder: Path, out: Path, quick: bool, seed: int, options: Options, overw
     found = dict(stream(_diagnose, tasks, replace(options, journal=options.journal or out / _JOURNAL)))
     results = {"quick": quick, "seed": seed, "cases": {task["case"]: found[i] for i, task in enumerate(tasks)}}
     remove_results(_stale(out, {str(name) for name in benchmark["cases"]}))
-    write_text(out / RESULTS, json.dumps(results, indent=1) + "\n")
-    write_text(out / BENCHMARK, json.dumps(benchmark, indent=1) + "\n")
+    write_json(out / RESULTS, results)
+    write_json(out / BENCHMARK, benchmark)
     return results
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import matching, refuse_older, write_text
+from xb_muscle_ros.files import matching, refuse_older, write_json, write_text
 from xb_muscle_ros.prove import calibration
 from xb_muscle_ros.prove.answers import Answer
 from xb_muscle_ros.prove.calibration import Stated, as_stated, reliability
@@ -20,6 +20,7 @@ from xb_muscle_ros.prove.judging import Judged, JudgedEffect, JudgedName, Judged
 from xb_muscle_ros.prove.run import RESULTS
 from xb_muscle_ros.prove.score_figures import draw_composites, draw_singles
 from xb_muscle_ros.prove.sealing import COMPOSITES, SINGLES, kind_of, load_benchmark, open_key
+from xb_muscle_ros.tables import Columns, filled, markdown, number
 from xb_muscle_ros.trials.bag_files import remove_results
 
 # Confidence in a first name is binned in fifths.
@@ -152,37 +153,42 @@ def _write(summary: Summary, key_sha256: str, out: Path) -> tuple[str, list[Path
     }
     text = table(summary.scores)
     page = f"# Scores of {tree['cases']} concealed cases\n\nKey: SHA-256 {key_sha256}\n\n{text}\n\n{summary.section}"
-    write_text(out / "scores.json", json.dumps(tree, indent=1) + "\n")
+    write_json(out / "scores.json", tree)
     write_text(out / "scores.md", page)
     return text, [out / "scores.json", out / "scores.md", *summary.draw(out)]
 
 
 def table(found: Sequence[Score]) -> str:
     """Scores as Markdown."""
-    rows = ["| score | value | 95 % interval | cases | bar | reached |", "|---|---|---|---|---|---|"]
-    for s in found:
-        reached = {True: "yes", False: "no", None: ""}[s.reached]
-        bar = "" if s.bar is None else f"{'≤' if s.at_most else '≥'} {_number(s, s.bar)}"
-        between = "" if s.lower is None or s.upper is None else f"{_number(s, s.lower)} to {_number(s, s.upper)}"
-        rows.append(f"| {s.meaning} | {_number(s, s.value)} | {between} | {s.n} | {bar} | {reached} |")
-    return "\n".join(rows)
+    columns: Columns[Score] = {
+        "score": lambda s: s.meaning,
+        "value": lambda s: _number(s, s.value),
+        "95 % interval": lambda s: "" if s.lower is None else f"{_number(s, s.lower)} to {_number(s, s.upper)}",
+        "cases": lambda s: str(s.n),
+        "bar": lambda s: "" if s.bar is None else f"{'≤' if s.at_most else '≥'} {_number(s, s.bar)}",
+        "reached": lambda s: {True: "yes", False: "no", None: ""}[s.reached],
+    }
+    return markdown(*filled(columns, found))
 
 
 def _number(s: Score, value: float | None) -> str:
-    if value is None:
-        return "–"
     # All but these are shares of cases.
     decimals = 2 if s.name == "gain" else 3 if s.name.startswith("calibration") else None
-    return f"{100.0 * value:.0f} %" if decimals is None else f"{value:.{decimals}f}"
+    return _share(value) if decimals is None else number(value, f".{decimals}f")
+
+
+def _share(value: float | None) -> str:
+    return number(value, ".0%").replace("%", " %")
 
 
 def _sizes(what: str, rows: Sequence[Mapping[str, Any]], heads: Mapping[str, str]) -> str:
     """Shares by class of size as Markdown; heads by name of the share."""
-    columns = ["size", "cases", *heads.values()]
-    out = [f"## {what} by size", "", f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
-    for row in rows:
-        size = f"{100.0 * row['from_f0']:g} % F0" if row["from_f0"] else "below 0.5 % F0"
-        values = (row[name]["value"] for name in heads)
-        cells = ("–" if value is None else f"{100.0 * value:.0f} %" for value in values)
-        out.append(f"| {' | '.join([size, str(row['n']), *cells])} |")
-    return "\n".join([*out, ""])
+    cells = [
+        [
+            f"{100.0 * row['from_f0']:g} % F0" if row["from_f0"] else "below 0.5 % F0",
+            str(row["n"]),
+            *(_share(row[name]["value"]) for name in heads),
+        ]
+        for row in rows
+    ]
+    return f"## {what} by size\n\n{markdown(['size', 'cases', *heads.values()], cells)}\n"

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.files import matching, refuse_older
+from xb_muscle_ros.files import matching, refuse_older, write_json
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.replay.report import Record, add_relative_stiffness, record, table, write_json
+from xb_muscle_ros.progress import Progress
+from xb_muscle_ros.replay.report import Record, record, table, with_relative_srs
 from xb_muscle_ros.simulation.offline import simulate_trial
 from xb_muscle_ros.trials.bag_files import plain, remove_results
 from xb_muscle_ros.trials.bags import write_trial
@@ -71,9 +72,13 @@ def replay(
         simulated = tuple(live(trials, fibre))
     else:
         muscle = Muscle(fibre)
-        simulated = tuple(simulate_trial(muscle, trial, substeps, settle_s) for trial in trials)
-    records = [record(trial, one, fibre) for trial, one in zip(trials, simulated, strict=True)]
-    add_relative_stiffness(records)
+        made = []
+        with Progress(len(trials), "replay") as progress:
+            for trial in trials:
+                made.append(simulate_trial(muscle, trial, substeps, settle_s))
+                progress.update()
+        simulated = tuple(made)
+    records = with_relative_srs([record(trial, one, fibre) for trial, one in zip(trials, simulated, strict=True)])
     how = "live, through muscle_node" if live is not None else "offline"
     title = f"fibre {fibre.name}, model {fibre.model}, method {fibre.method} ({how})"
     return Replay(fibre, live is not None, simulated, tuple(records), table(records, title))
@@ -131,8 +136,9 @@ def write_results(folder: Path, trials: Sequence[Trial], results: Replay, live: 
     from xb_muscle_ros.replay.figure import draw_replay
 
     remove_results(older_results(folder))
-    facts = {"fibre": results.fibre.name, "model": results.fibre.model, "method": results.fibre.method}
-    write_json(folder / "replay.json", results.records, {**facts, "live": results.live, "source": results.fibre.source})
+    fibre = results.fibre
+    tree = {"trials": results.records, "fibre": fibre.name, "model": fibre.model, "method": fibre.method}
+    write_json(folder / "replay.json", {**tree, "live": results.live, "source": fibre.source})
     name = f"{title_of(results.fibre.model)} ({'live' if results.live else 'offline'})"
     pages = draw_replay(folder / "replay.png", trials, results.simulated, name, live.simulated if live else None)
     for trial, simulated in zip(trials, results.simulated, strict=True):

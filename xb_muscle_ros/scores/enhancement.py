@@ -58,10 +58,10 @@ def enhancement(stretched: Side, isometric: Side, at_s: float) -> Enhancement | 
         at_s: middle of the window of 0.1 s whose means are compared, s.
     """
     a, b = (_mean_about(side, at_s) for side in (stretched, isometric))
-    if a is None or b is None:
-        which = "stretched" if a is None else "isometric"
+    if a.value is None or b.value is None:
+        which = "stretched" if a.value is None else "isometric"
         return Missing(f"the {which} trial has no force within {0.5 * WINDOW_S:g} s of {at_s:.4g} s")
-    over = quotient(Estimate(*a), Estimate(*b))
+    over = quotient(a, b)
     difference = a.value - b.value
     relative = None if over.value is None else difference / b.value
     se = None if a.se is None or b.se is None else rounded(math.hypot(a.se, b.se))
@@ -69,14 +69,9 @@ def enhancement(stretched: Side, isometric: Side, at_s: float) -> Enhancement | 
     return Enhancement(a.value, b.value, difference, relative, se, over.se)
 
 
-class _Mean(NamedTuple):
-    value: float
-    se: float | None
-
-
-def _mean_about(side: Side, at_s: float) -> _Mean | None:
+def _mean_about(side: Side, at_s: float) -> Estimate:
     inside = np.abs(side.time_s - at_s) <= 0.5 * WINDOW_S + 5e-10
     if not np.any(inside):
-        return None
+        return Estimate(None)
     se = None if side.noise is None else side.noise.of_mean(side.time_s[inside])
-    return _Mean(float(np.mean(side.force_f0[inside])), se)
+    return Estimate(float(np.mean(side.force_f0[inside])), se)

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from xb_muscle_ros.tables import unsound
+
 
 class Estimate(NamedTuple):
     """One number.
@@ -26,11 +28,6 @@ class Missing(NamedTuple):
     """Why something cannot be had, in words."""
 
     why: str
-
-
-def unsound(value: float | None, se: float | None) -> bool:
-    """Whether a standard error is as large as its value or larger: such a number is known to be small, and no more."""
-    return value is not None and se is not None and math.isfinite(se) and se >= abs(value)
 
 
 def samples(count: int) -> str:
@@ -59,23 +56,6 @@ def quotient(value: Estimate, reference: Estimate) -> Estimate:
     if value.se is None or reference.se is None:
         return Estimate(ratio, why=value.why or reference.why)
     return Estimate(ratio, rounded(math.hypot(value.se, ratio * reference.se) / abs(reference.value)))
-
-
-def error_text(se: float | None, factor: float = 1.0) -> str:
-    """A standard error for a table, with the sign before it; empty where it is not known."""
-    if se is None or not math.isfinite(se):
-        return ""
-    scaled = factor * se
-    return f" ± {scaled:.0f}" if scaled >= 10.0 else f" ± {scaled:.2g}"
-
-
-MARK = "*"
-MARK_NOTE = f"{MARK} standard error as large as the value or larger: known to be small, and no more"
-
-
-def mark(value: float | None, se: float | None) -> str:
-    """`MARK` for a number that is `unsound`."""
-    return MARK if unsound(value, se) else ""
 
 
 def notes_of(told: Sequence[tuple[str, str]]) -> list[str]:

@@ -2,20 +2,38 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
-from xb_muscle_ros.scores.estimate import Estimate
-from xb_muscle_ros.scores.isometric import isometric_force
+from xb_muscle_ros.scores.estimate import Estimate, quotient
 from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN, ForceNoise, force_noise
+from xb_muscle_ros.scores.steady import steady_part
 from xb_muscle_ros.scores.stiffness import stiffness_of_phase
 from xb_muscle_ros.trials.trial import Array, Trial
 
 SRS_CONDITIONING, SRS_TEST, ISOMETRIC = "srs_conditioning", "srs_test", "isometric_f0"
+Done = tuple[str, float | None, float | None, float | None]
+"""Fibre, pCa, amplitude (L0) and recovery time (s) of a trial; None or NaN where not known."""
 TEXT = {
     SRS_CONDITIONING: "SRS of the conditioning stretch",
     SRS_TEST: "SRS of the test stretch",
     ISOMETRIC: "isometric force",
 }
+
+
+def isometric_force(trial: Trial, time_s: Array, force_f0: Array, noise: ForceNoise | None = None) -> Estimate:
+    """Mean force (F0) over the steady isometric part that a trial begins with: the one definition of all commands.
+
+    Args:
+        trial, time_s, force_f0: see `steady_part`.
+        noise: of the force; None for simulated force.
+    """
+    inside, why = steady_part(trial, time_s, force_f0)
+    if why:
+        return Estimate(None, why=why)
+    return Estimate(float(np.mean(force_f0[inside])), None if noise is None else noise.of_mean(time_s[inside]))
 
 
 def read_off(trial: Trial, time_s: Array, force_f0: Array, noise: ForceNoise | None = None) -> dict[str, Estimate]:
@@ -42,3 +60,28 @@ def read_off_measured(trial: Trial) -> dict[str, Estimate]:
     if noise is not None:
         return found
     return {name: each if each.value is None else each._replace(why=NO_NOISE_KNOWN) for name, each in found.items()}
+
+
+def references(trials: Sequence[Done]) -> list[int | None]:
+    """For each trial the place of the reference trial (amplitude 0) of its fibre and pCa.
+
+    Of several that which is nearest in recovery time: it lay nearest in the order of the experiment.
+    """
+    known: dict[tuple[str, str], list[int]] = {}
+    for k, (fibre, pca, amplitude_l0, _) in enumerate(trials):
+        if amplitude_l0 == 0.0:
+            known.setdefault((fibre, _level(pca)), []).append(k)
+    recovery = [0.0 if each is None or math.isnan(each) else each for *_, each in trials]
+    return [
+        min(known.get((fibre, _level(pca)), []), key=lambda r: abs(recovery[r] - recovery[k]), default=None)
+        for k, (fibre, pca, _, _) in enumerate(trials)
+    ]
+
+
+def _level(pca: float | None) -> str:
+    return f"{math.nan if pca is None else pca:.6g}"
+
+
+def relative_srs(test: Estimate, reference: Estimate, is_reference: bool) -> Estimate:
+    """SRS of a test stretch over that of the reference trial; the reference itself has 1, without error."""
+    return Estimate(1.0) if is_reference and test.value else quotient(test, reference)

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import curve_fit
 
-from xb_muscle_ros.scores.estimate import Missing
+from xb_muscle_ros.scores.estimate import Estimate, Missing
 from xb_muscle_ros.scores.noise.hum import hum
 from xb_muscle_ros.scores.noise.pieces import Piece, steps_evenly
 from xb_muscle_ros.scores.noise.trials import by_curves
 from xb_muscle_ros.scores.standard_error import ForceNoise
-from xb_muscle_ros.trials.trial import Array
+from xb_muscle_ros.trials.trial import Array, Trial
 
 # A manoeuvre: this much shorter, for at most this long, and back to within this share of the step.
 SMALLEST_RELEASE_L0 = 0.05
@@ -29,6 +29,9 @@ _STILL_L0 = 0.01
 _SHORTEST_S = 0.2
 # Force that does not fall this far leaves nothing to redevelop.
 _SMALLEST_FALL = 0.1
+
+
+K_TR = "k_tr"
 
 
 class Redevelopment(NamedTuple):
@@ -84,6 +87,23 @@ def still_until(time_s: Array, length_l0: Array, restretched_s: float) -> float:
     t, length = time_s[after], length_l0[after]
     moved = np.flatnonzero(np.abs(length - length[0]) > _STILL_L0)
     return float(t[moved[0] - 1] if moved.size else t[-1])
+
+
+def redevelopment_rate(trial: Trial, time_s: Array, force_f0: Array, noise: ForceNoise | None = None) -> Estimate:
+    """k_tr (1/s) of a trial's force; no value, of which nothing is said, where it is not released and restretched.
+
+    Args:
+        trial: lengths and calcium.
+        time_s, force_f0, noise: see `redevelopment`.
+    """
+    restretched = restretch_end(trial.time_s, trial.length_change_l0)
+    if restretched is None:
+        return Estimate(None)
+    if np.ptp(trial.calcium_um) > 0.0:
+        return Estimate(None, why="calcium changes, so that force does not redevelop alone")
+    until = still_until(trial.time_s, trial.length_change_l0, restretched)
+    found = redevelopment(time_s, force_f0, restretched, until, noise)
+    return Estimate(None, why=found.why) if isinstance(found, Missing) else Estimate(found.k_per_s, found.se_per_s)
 
 
 def redevelopment(

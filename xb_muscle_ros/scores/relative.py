@@ -6,8 +6,9 @@ history leaves stiffness as it was, 0 where nothing is left of it.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -32,11 +33,13 @@ class ByClass(NamedTuple):
         test: mean SRS of test stretches, shape (classes, ...), F0/L0.
         unconditioned: mean SRS of unconditioned stretches of the same pCa, same shape, F0/L0.
         ratio: mean over pCa of the one over the other, same shape.
+        se: standard error of `test` over `unconditioned`, to first order, same shape; NaN where it is not known.
     """
 
     test: Array
     unconditioned: Array
     ratio: Array
+    se: Array
 
 
 class Averaged(NamedTuple):
@@ -53,24 +56,39 @@ class Averaged(NamedTuple):
     n: npt.NDArray[np.int64]
 
 
-def by_class(test: Array, unconditioned: Array, classes: npt.NDArray[np.int64]) -> ByClass:
+def by_class(
+    test: Array,
+    unconditioned: Array,
+    classes: npt.NDArray[np.int64],
+    test_se: Array | None = None,
+    unconditioned_se: Array | None = None,
+) -> ByClass:
     """Pool a fibre's pCa by activation class.
 
     Args:
         test: shape (pca, ...), SRS of test stretches, F0/L0; NaN where not measured.
         unconditioned: shape (pca,), SRS of the unconditioned stretch at each pCa, F0/L0.
         classes: shape (pca,), see `activation_class`.
+        test_se, unconditioned_se: standard errors, shapes as of the values; None or NaN where not known.
     """
-    below = np.broadcast_to(unconditioned.reshape(-1, *[1] * (test.ndim - 1)), test.shape)
+    column = (-1, *[1] * (test.ndim - 1))
+    below = np.broadcast_to(unconditioned.reshape(column), test.shape)
     both = np.isfinite(test) & np.isfinite(below)
+    errors = np.full((2, *test.shape), np.nan)
+    if test_se is not None and unconditioned_se is not None:
+        errors[0], errors[1] = test_se, unconditioned_se.reshape(column)
     shape = (len(CLASSES), *test.shape[1:])
-    pooled = ByClass(np.full(shape, np.nan), np.full(shape, np.nan), np.full(shape, np.nan))
+    pooled = ByClass(*(np.full(shape, np.nan) for _ in ByClass._fields))
     for level in range(len(CLASSES)):
         here = classes == level
         used = np.where(both[here], 1.0, np.nan)
-        pooled.test[level] = nanmean(test[here] * used)
-        pooled.unconditioned[level] = nanmean(below[here] * used)
+        pooled.test[level] = mean = nanmean(test[here] * used)
+        pooled.unconditioned[level] = mean_below = nanmean(below[here] * used)
         pooled.ratio[level] = nanmean(_divided(test[here], below[here]) * used)
+        count = np.maximum(np.sum(both[here], axis=0), 1)
+        of_test, of_below = np.sqrt(np.where(both[here], errors[:, here] ** 2, 0.0).sum(axis=1)) / count
+        divisor = np.where(mean_below != 0.0, mean_below, np.nan)
+        pooled.se[level] = np.hypot(of_test, of_below * mean / divisor) / np.abs(divisor)
     return pooled
 
 
@@ -94,37 +112,43 @@ def over_fibres(fibres: Sequence[ByClass], averaging: str = "mean") -> Averaged:
     return Averaged(centre, nansd(each), n)
 
 
-def rmsd(a: Array, b: Array, where: npt.NDArray[np.bool_]) -> tuple[float, float, int]:
-    """Root-mean-square difference, residual sum of squares and count over the conditions of a mask known to both."""
+class Rmsd(NamedTuple):
+    """Root-mean-square difference (None where nothing is known to both), residual sum of squares, and how many."""
+
+    value: float | None
+    rss: float
+    n: int
+
+
+def rmsd(a: Array, b: Array, where: npt.NDArray[np.bool_]) -> Rmsd:
+    """Difference over the conditions of a mask that are known to both."""
     known = where & np.isfinite(a) & np.isfinite(b)
     count = int(np.count_nonzero(known))
     rss = float(np.sum((a[known] - b[known]) ** 2))
-    return (float(np.sqrt(rss / count)) if count else float("nan")), rss, count
+    return Rmsd(float(np.sqrt(rss / count)) if count else None, rss, count)
 
 
 def nanmean(values: Array) -> Array:
     """Mean over the first axis without NaN; NaN where nothing is left."""
-    n = np.sum(np.isfinite(values), axis=0)
-    total = np.sum(np.where(np.isfinite(values), values, 0.0), axis=0)
-    return _divided(total, np.where(n > 0, n, np.nan))
+    return _without_warning(np.nanmean, values)
 
 
 def nanmedian(values: Array) -> Array:
     """Median over the first axis without NaN; NaN where nothing is left."""
-    ordered = np.sort(np.where(np.isfinite(values), values, np.nan), axis=0)  # NaN goes last
-    n = np.sum(np.isfinite(values), axis=0)
-    last = np.maximum(n - 1, 0)
-    low = np.take_along_axis(ordered, (last // 2)[None], axis=0)[0]
-    high = np.take_along_axis(ordered, ((last + 1) // 2)[None], axis=0)[0]
-    middle: Array = 0.5 * (low + high)
-    return middle
+    return _without_warning(np.nanmedian, values)
 
 
 def nansd(values: Array) -> Array:
     """Standard deviation (n - 1) over the first axis without NaN; NaN for fewer than two values."""
-    n = np.sum(np.isfinite(values), axis=0)
-    squares = np.sum(np.where(np.isfinite(values), (values - nanmean(values)) ** 2, 0.0), axis=0)
-    return np.sqrt(_divided(squares, np.where(n > 1, n - 1.0, np.nan)))
+    return _without_warning(np.nanstd, values, ddof=1)
+
+
+def _without_warning(function: Any, values: Array, **more: int) -> Array:
+    """NumPy warns where nothing is left."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        found: Array = function(values, axis=0, **more)
+    return found
 
 
 def _divided(a: Array, b: Array) -> Array:

@@ -53,8 +53,24 @@ def force_rmsd(time_s: Array, simulated: Array, measured: Array, window: tuple[f
     return float(np.sqrt(np.mean((simulated[inside] - measured[inside]) ** 2)))
 
 
+def force_rmsds(trial: Trial, time_s: Array, force_f0: Array) -> dict[str, float | None]:
+    """RMSD (F0) of a simulated force at the measured samples by the names of `windows`; None as in `force_rmsd`.
+
+    Args:
+        trial: as measured; without measured force there is no RMSD.
+        time_s, force_f0: simulated, shape (n,), s and F0.
+    """
+    at_measured = np.interp(trial.force_time_s, time_s, force_f0)
+    return {
+        name: force_rmsd(trial.force_time_s, at_measured, trial.measured_f0, window)
+        for name, window in windows(trial).items()
+    }
+
+
 def short_windows(trial: Trial) -> dict[str, str]:
-    """Why windows that a trial has leave no RMSD, in words, by name."""
+    """Why windows that a trial with measured force has leave no RMSD, in words, by name."""
+    if not trial.force_time_s.size:
+        return {}
     counts = {
         name: int(np.count_nonzero(_inside(trial.force_time_s, window)))
         for name, window in windows(trial).items()

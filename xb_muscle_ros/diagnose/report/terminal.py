@@ -8,9 +8,9 @@ from xb_muscle_ros.diagnose.component import NAMED, Component, Kind
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.prose import headline, summary
 from xb_muscle_ros.diagnose.result import Diagnosis
+from xb_muscle_ros.tables import aligned
 
 _HEAD = ("component", "probability", "ablation loss", "held-out gain ± se", "parameter [95 %]", "does")
-_RIGHT = (1, 2)
 _MOST_ROWS, _NAME = 8, 38
 # Less probable ones are only counted, unless there is nothing else.
 _LEAST = 0.05
@@ -36,16 +36,7 @@ def _table(d: Diagnosis) -> list[str]:
     likely = [c for c in d.components if c.inclusion_probability >= _LEAST] or list(d.components[:1])
     # Whatever is named is listed, however many there are.
     shown = likely[: max(_MOST_ROWS, sum(c.inclusion_probability >= NAMED for c in d.components))]
-    rows = [_HEAD] + [row for c in shown for row in _rows(c)]
-    widths = [max(len(row[k]) for row in rows) for k in range(len(_HEAD))]
-    lines = []
-    for row in rows:
-        cells = [
-            f"{cell:>{w}}" if k in _RIGHT else f"{cell:<{w}}"
-            for k, (cell, w) in enumerate(zip(row, widths, strict=True))
-        ]
-        lines.append("  ".join(cells).rstrip())
-    lines.insert(1, "  ".join("-" * w for w in widths))
+    lines = aligned(_HEAD, [row for c in shown for row in _rows(c)], left=(0, 3, 4, 5)).split("\n")
     left = len(d.components) - len(shown)
     return [*lines, f"{len(shown)} of {len(d.components)} candidates shown"] if left else lines
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.evaluate.figures.look import MEASURED, look, shade
-from xb_muscle_ros.evaluate.srs_errors import pooled_error
+from xb_muscle_ros.evaluate.sections import SrsSection
 from xb_muscle_ros.evaluate.srs_scores import READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, place
 from xb_muscle_ros.models.titles import title_of
@@ -40,7 +40,7 @@ class _Profile:
     def __init__(self, table: SrsTable, along: str) -> None:
         pooled = table.pooled(_READING.unconditioned)
         each = np.array([p.test / np.where(p.unconditioned == 0.0, np.nan, p.unconditioned) for p in pooled.values()])
-        error = np.array([pooled_error(table, name, _READING.unconditioned, p) for name, p in pooled.items()])
+        error = np.array([p.se for p in pooled.values()])
         j, k = place(table.recovery_s, COMMON_RECOVERY_S), place(table.amplitude_l0, COMMON_AMPLITUDE_L0)
         level = CLASSES.index(COMMON_CLASS)
         empty = np.empty((each.shape[0], 0))
@@ -73,14 +73,14 @@ NOTHING_TO_DRAW = (
 )
 
 
-def drawable(data: SrsTable, tables: Mapping[str, SrsTable], section: Mapping[str, Any]) -> bool:
+def drawable(data: SrsTable, tables: Mapping[str, SrsTable], section: SrsSection) -> bool:
     """Whether there is anything to draw; see `draw_srs`."""
     profiles = (_Profile(table, along) for table in (data, *tables.values()) for along in _ALONG)
-    scores = (of[reading]["rmsd"][which] for of in section["models"].values() for reading in _SIDES for which in SETS)
+    scores = (of.under[reading].rmsd[which] for of in section.models.values() for reading in _SIDES for which in SETS)
     return any(profile.means()[0].size for profile in profiles) or any(score is not None for score in scores)
 
 
-def draw_srs(path: Path, data: SrsTable, tables: Mapping[str, SrsTable], section: Mapping[str, Any]) -> bool:
+def draw_srs(path: Path, data: SrsTable, tables: Mapping[str, SrsTable], section: SrsSection) -> bool:
     """Draw profiles of relative SRS (A to C) and its RMSD by model (D to F); PNG, and PDF beside it.
 
     Dots are measured fibres with the standard errors of their relative SRS, where known; larger symbols their means
@@ -121,13 +121,13 @@ def draw_srs(path: Path, data: SrsTable, tables: Mapping[str, SrsTable], section
     return True
 
 
-def _readings_text(section: Mapping[str, Any]) -> str:
+def _readings_text(section: SrsSection) -> str:
     """What open and filled bars are, as far as there are any."""
     words = {"text": "open: reading 'text'", "released": "filled: reading 'released'"}
     shown = [
         words[reading]
         for reading in _SIDES
-        if any(of[reading]["rmsd"][which] is not None for of in section["models"].values() for which in SETS)
+        if any(of.under[reading].rmsd[which] is not None for of in section.models.values() for which in SETS)
     ]
     return "\n".join(shown)
 
@@ -194,11 +194,11 @@ def _class_force(table: SrsTable, fibre: str) -> Array:
     return np.array([nanmean(force[classes == level][:, None])[0] for level in range(len(CLASSES))])
 
 
-def _bars(axis: Any, which: str, section: Mapping[str, Any]) -> None:
-    models = list(section["models"])
+def _bars(axis: Any, which: str, section: SrsSection) -> None:
+    models = list(section.models)
     for k, name in enumerate(models):
         for reading, side in _SIDES.items():
-            value = section["models"][name][reading]["rmsd"][which]
+            value = section.models[name].under[reading].rmsd[which]
             if value is not None:
                 way = look(name)
                 fill = shade(way.colour, 0.4) if way.hollow else way.colour
@@ -208,7 +208,7 @@ def _bars(axis: Any, which: str, section: Mapping[str, Any]) -> None:
                 )  # fmt: skip
     axis.set_xticks(range(len(models)), [title_of(name) for name in models], rotation=35, ha="right")
     axis.set_xlim(-0.6, len(models) - 0.4)
-    if all(of[reading]["rmsd"][which] is None for of in section["models"].values() for reading in _SIDES):
+    if all(of.under[reading].rmsd[which] is None for of in section.models.values() for reading in _SIDES):
         axis.text(0.5, 0.5, "not tested", transform=axis.transAxes, ha="center", va="center")
     axis.set_title(f"{which} reductions" if which != "all" else "all conditions", loc="left")
     axis.set_ylim(bottom=0.0)

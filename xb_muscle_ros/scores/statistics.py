@@ -1,7 +1,8 @@
-"""Paired t-tests between models, corrected after Bonferroni."""
+"""Statistics of models: Akaike's information criterion, and paired t-tests corrected after Bonferroni."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -52,3 +53,22 @@ def paired_t(first: Sequence[float], second: Sequence[float]) -> Paired:
 def bonferroni_threshold(comparisons: int, alpha: float = ALPHA) -> float:
     """Largest p that is significant when so many comparisons are made: 0.05/15 = 0.0033 in van der Zee et al. 2026."""
     return alpha / max(1, comparisons)
+
+
+def aic(residual_sum_of_squares: float, observations: int, fitted_parameters: int) -> float | None:
+    """Akaike's information criterion for least squares, 2k + m·ln(RSS/m).
+
+    Lower is better, and only differences at the same observations mean anything.
+
+    Args:
+        residual_sum_of_squares: RSS over the observations, in the square of their unit.
+        observations: m; 84 conditions in van der Zee et al. 2026.
+        fitted_parameters: k.
+
+    Returns:
+        None where nothing is left to explain (RSS of 0), or where there are no more observations than what was fitted:
+        parameters and the variance.
+    """
+    if observations <= fitted_parameters + 1 or not residual_sum_of_squares > 0.0:
+        return None
+    return 2.0 * fitted_parameters + observations * math.log(residual_sum_of_squares / observations)
