@@ -264,8 +264,8 @@ def test_scored_with_figures_and_never_as_single_effects(tmp_path: Path) -> None
     results = {case["case"]: SAID.get(case["case"], SAID["case_0001"]) for case in KEY}
     (tmp_path / "r" / RESULTS).write_text(json.dumps({"cases": results}))
     text, files = score(tmp_path / "r", tmp_path / "key.json", tmp_path / "s")
-    assert "| nulls with any mechanism named | 50 % | 1 % to 99 % | 2 | ≤ 2 % | no |" in text
-    assert "| expected calibration error of inclusion probabilities, as stated | 0." in text
+    assert "| nulls with any mechanism named | 50 % | 1 % to 99 % | 2 | ≤ 2 % | no |" in " ".join(text.split())
+    assert "| expected calibration error of inclusion probabilities, as stated | 0." in " ".join(text.split())
     assert {path.name for path in files} == {
         "scores.json", "scores.md", "found_by_size.png", "families.png", "calibration.png",
     }  # fmt: skip
