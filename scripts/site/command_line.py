@@ -10,9 +10,9 @@ from markdown_table import cell, table
 
 def reference() -> str:
     """A section for each command of ``xb_muscle``."""
-    from xb_muscle_ros.cli.main import parser
+    from xb_muscle_ros.cli.main import build_parser
 
-    return "\n".join(_section(name, made, 2) for name, made in _commands(parser()))
+    return "\n".join(_section(name, made, 2) for name, made in _commands(build_parser()))
 
 
 def _commands(parser: argparse.ArgumentParser) -> Iterator[tuple[str, argparse.ArgumentParser]]:

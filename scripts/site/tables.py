@@ -40,9 +40,9 @@ def node_parameters() -> str:
 def plant_parameters() -> str:
     """Parameters of ``plant_node``."""
     _of_node()
-    from xb_muscle_ros.plant.plant_parameters import parameters
+    from xb_muscle_ros.plant.plant_parameters import PLANT_PARAMETERS
 
-    return _rows_of(parameters())
+    return _rows_of(PLANT_PARAMETERS)
 
 
 def _rows_of(rows: Mapping[str, Any]) -> str:

@@ -77,7 +77,7 @@ def test_a_name_that_is_none_lists_those_that_are() -> None:
 def test_functions_say_units_errors_and_source(name: str) -> None:
     function = getattr(xb, name)
     told = inspect.getdoc(function) or ""
-    sections = ("Args:", "Raises:", "Source:", "Example:")
+    sections = ("Args:", "Raises:", "Source:", "Examples:")
     missing = [section for section in sections if section not in told]
     signature = inspect.signature(function)
     if signature.return_annotation != "None" and "Returns:" not in told:

@@ -33,10 +33,10 @@ def _parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParse
 
 
 def test_every_command_and_every_option_is_in_the_reference(site: ModuleType) -> None:
-    from xb_muscle_ros.cli.main import parser
+    from xb_muscle_ros.cli.main import build_parser
 
     text = site.command_line.reference()
-    for made in list(_parsers(parser()))[1:]:
+    for made in list(_parsers(build_parser()))[1:]:
         assert f"# {made.prog}\n" in text
         section = text.split(f"# {made.prog}\n")[1].split("\n#")[0]
         for action in made._actions:

@@ -179,7 +179,9 @@ def diagnose(
             are found by the fibre's name.
         model: parameter set of the fibre files; None: the one that the files name.
         method: how heads are distributed over strain; None: the files'.
-        reference_length, f0, trials_of: see `read_trials`; of bags only.
+        reference_length: see `read_trials`; of bags only.
+        f0: see `read_trials`; of bags only.
+        trials_of: see `read_trials`; of bags only.
         features: JSON table of measured SRS (F0/L0) and isometric force (F0) to be met beside the traces.
         predict: such a table that is predicted and compared, never fitted.
         nuisance: SDs of ordinary measurement errors where the study knows better, by name, such as
@@ -201,7 +203,7 @@ def diagnose(
     Source:
         method: docs/diagnose.md; how often it is right: docs/prove.md.
 
-    Example:
+    Examples:
         >>> import xb_muscle_ros as xb
         >>> xb.diagnose([], "18Dec2017a")
         Traceback (most recent call last):

@@ -223,7 +223,7 @@ def read_trials(
     Source:
         layout of the bags: docs/bags.md.
 
-    Example:
+    Examples:
         >>> import xb_muscle_ros as xb
         >>> notes = []
         >>> trials = xb.read_trials("bags", tell=notes.append)
@@ -259,7 +259,7 @@ def write_trials(trials: Trial | Sequence[Trial], folder: str | Path, *, overwri
     Source:
         layout of the bags: docs/bags.md.
 
-    Example:
+    Examples:
         >>> import tempfile, xb_muscle_ros as xb
         >>> trial = xb.StretchShortenStretch(amplitude_l0=0.0383, recovery_s=0.1).trial("mine", pca=6.1)
         >>> with tempfile.TemporaryDirectory() as folder:

@@ -52,7 +52,7 @@ def make_trial(
     Source:
         phases: docs/bags.md.
 
-    Example:
+    Examples:
         >>> import numpy as np, xb_muscle_ros as xb
         >>> t = np.arange(0.0, 0.5, 1e-3)
         >>> stretch = np.interp(t, [0.1, 0.2], [0.0, 0.0383])

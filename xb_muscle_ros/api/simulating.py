@@ -148,7 +148,7 @@ def simulate(
     Source:
         protocol and models of van der Zee et al. 2026, data of Horslen et al. 2023.
 
-    Example:
+    Examples:
         >>> import numpy as np, xb_muscle_ros as xb
         >>> xb.simulate("18Dec2017a", pca=[4.5, 6.1], recovery=0.1)
         SimulationResult(18Dec2017a, 3state_coop, 2 trials: amp383_rt100ms_pca45, amp383_rt100ms_pca61)

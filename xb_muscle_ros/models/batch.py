@@ -26,7 +26,7 @@ class MuscleBatch:
     Source:
         see `Muscle`.
 
-    Example:
+    Examples:
         >>> import numpy as np, xb_muscle_ros as xb
         >>> batch = xb.MuscleBatch([xb.load_fibre("18Dec2017a"), xb.load_fibre("13Dec2017a")])
         >>> states = batch.settle(np.zeros(2), np.full(2, 0.8))  # L0 and µM, shape (fibres,)

@@ -100,7 +100,7 @@ def load_fibre(
     Source:
         the package's files hold the sets released with van der Zee et al. 2026; each says where it comes from.
 
-    Example:
+    Examples:
         >>> import xb_muscle_ros as xb
         >>> fibre = xb.load_fibre("18Dec2017a", model="2state")
         >>> fibre.model, fibre.method
@@ -143,7 +143,7 @@ def changed(fibre: Fibre, changes: Mapping[str, object], where: str = "changes")
     Source:
         names, units and bounds: the table of parameters, ``xb_muscle parameters``.
 
-    Example:
+    Examples:
         >>> import xb_muscle_ros as xb
         >>> xb.changed(xb.load_fibre("18Dec2017a"), {"f": 95.0}).values["f"]
         95.0

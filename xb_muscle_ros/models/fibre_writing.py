@@ -52,7 +52,7 @@ def write_fibre(path: Path, fibre: Fibre, comments: Sequence[str] = ()) -> None:
     Source:
         layout of the file: docs/node.md.
 
-    Example:
+    Examples:
         >>> import pathlib, tempfile, xb_muscle_ros as xb
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     file = pathlib.Path(folder) / "mine.yaml"

@@ -56,7 +56,7 @@ class Muscle:
     Source:
         equations and their solution: docs/model.md, after van der Zee et al. 2026.
 
-    Example:
+    Examples:
         >>> import xb_muscle_ros as xb
         >>> muscle = xb.Muscle(xb.load_fibre("18Dec2017a"))
         >>> state = muscle.settle(0.0, 0.8)  # length change in L0, free calcium in µM
