@@ -91,7 +91,7 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
         options: where the work is done; finished starts and profiles are kept in the journal.
 
     Raises:
-        UserError: no coordinate to move, nothing to fit to, no finite start, and what `work.run` raises.
+        UserError: no coordinate to move, nothing to fit to, no finite start, and what `work.stream` raises.
     """
     if not problem.coordinates:
         raise UserError("nothing is free to be fitted; name parameters with --free or faults with --nuisance")
