@@ -98,7 +98,7 @@ def test_what_an_older_diagnosis_had_is_gone_and_what_is_not_its_own_stays(tmp_p
     assert json.loads((tmp_path / "diagnosis.json").read_text())["seed"] == 7
 
 
-@pytest.mark.parametrize("what", ["write_traces", "write_text"])
+@pytest.mark.parametrize("what", ["write_traces", "write_json"])
 def test_a_record_appears_last_and_whole(what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(*_: Any) -> None:
         raise UserError("disk full")
