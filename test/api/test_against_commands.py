@@ -38,6 +38,7 @@ def test_simulate(made: xb.SimulationResult, tmp_path: Path) -> None:
             assert np.array_equal(getattr(ours, name), getattr(read_back, name)), name
 
 
+@pytest.mark.slow
 def test_replay(made: xb.SimulationResult, bags: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "cli"
     assert main(["replay", str(bags), "--fiber", FIBRE, "--model", "2state", "--out", str(out)]) == 0
@@ -53,6 +54,7 @@ def test_replay(made: xb.SimulationResult, bags: Path, tmp_path: Path, capsys: p
     assert read(saved[0]) == read(out / "replay.json")
 
 
+@pytest.mark.slow
 def test_fit(made: xb.SimulationResult, bags: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     given = ["--free", "f", "k21", "--hold-out", "pca=6.1", "--bound", "f=50:200", "--prior", "k21=20:0.5"]
     work = ["--starts", "1", "--no-intervals", "--no-anchor", "--processes", "0"]
@@ -76,6 +78,7 @@ def test_fit(made: xb.SimulationResult, bags: Path, tmp_path: Path, capsys: pyte
     assert found.values["f"] == pytest.approx(95.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_evaluate(made: xb.SimulationResult, bags: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     models = ["2state", "3state_coop"]
     given = ["evaluate", str(bags), "--model", *models, "--processes", "0", "--out", str(tmp_path / "cli")]
@@ -90,6 +93,7 @@ def test_evaluate(made: xb.SimulationResult, bags: Path, tmp_path: Path, capsys:
     assert overall[0] == overall[1]
 
 
+@pytest.mark.slow
 def test_diagnose(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = xb.simulate(
         FIBRE, model="3state_coop", set=EXACT, pca=[4.5, 6.1], amplitude=[0.0, 0.0383], recovery=0.1, as_measured=True

@@ -38,6 +38,7 @@ def test_import_is_quick_and_loads_nothing_heavy() -> None:
     assert float(took) < 0.05
 
 
+@pytest.mark.slow
 def test_ros_and_matplotlib_wait_until_they_are_used() -> None:
     code = "import sys, xb_muscle_ros as xb; xb.replay, xb.fit; print({'matplotlib', 'rclpy'} & set(sys.modules))"
     assert printed(code) == "set()"
@@ -50,6 +51,7 @@ def test_stub_names_what_the_package_gives() -> None:
     assert set(told) | {"__version__"} == set(xb.__all__)
 
 
+@pytest.mark.slow
 def test_functions_stay_where_folders_of_their_names_are_imported() -> None:
     code = (
         "import xb_muscle_ros as xb, xb_muscle_ros.fit.run, xb_muscle_ros.replay.run, xb_muscle_ros.evaluate.run;"
@@ -100,6 +102,7 @@ def test_classes_say_what_they_hold(name: str) -> None:
             assert inspect.getdoc(function), f"{name}.{method}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*FUNCTIONS, *CLASSES])
 def test_examples_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)

@@ -40,6 +40,7 @@ def test_notebooks_hold_no_outputs_and_use_public_names(notebook: tuple[Path, An
     assert imported <= {"xb_muscle_ros", "xb_muscle_ros.cli.main"}
 
 
+@pytest.mark.slow
 def test_notebooks_run(notebook: tuple[Path, Any]) -> None:
     from nbclient import NotebookClient
 

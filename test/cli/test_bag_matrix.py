@@ -181,6 +181,7 @@ def right(bags: dict[str, Path], fibre: Path, tmp_path_factory: pytest.TempPathF
     return functools.cache(lambda command: RUN[command](bags["own"], fibre, tmp_path_factory.mktemp(command)))
 
 
+@pytest.mark.slow
 def test_the_own_bags_tell_what_was_made(right: Right) -> None:
     assert right("fit")["f"] == pytest.approx(1.15 * 79.0, rel=5e-3)
     assert right("fit")["rmsd"] == pytest.approx(7e-4, rel=0.2)
@@ -189,6 +190,7 @@ def test_the_own_bags_tell_what_was_made(right: Right) -> None:
     assert right("diagnose")["noise"] == pytest.approx(7e-4, rel=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_bag_of_any_kind_gives_the_numbers_of_the_own_one(
@@ -236,6 +238,7 @@ def test_lengths_far_from_l0_are_one_line_in_every_command(
     assert not [path for path in tmp_path.rglob("*") if path.is_file() and "journal" not in path.name]
 
 
+@pytest.mark.slow
 def test_l0_and_f0_of_the_command_line_are_as_good_as_those_of_a_bag(
     bags: dict[str, Path], fibre: Path, right: Right, tmp_path: Path
 ) -> None:
@@ -249,6 +252,7 @@ def test_l0_and_f0_of_the_command_line_are_as_good_as_those_of_a_bag(
         assert row["rmsd_f0"]["whole"] == pytest.approx(right("replay")[f"{i} rmsd_whole"], rel=0.01)
 
 
+@pytest.mark.slow
 def test_evaluate_takes_every_fibre_that_has_a_file(
     bags: dict[str, Path], fibre: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -25,6 +25,7 @@ def bag(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_it_prints_tables_and_names_the_files(bag: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     assert main(["evaluate", str(bag), "--model", "2state", "3state_coop", "--processes", "0", "--out", str(out)]) == 0

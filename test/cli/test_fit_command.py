@@ -38,6 +38,7 @@ def fit(bags: str, out: Path, *more: str) -> list[str]:
     return ["fit", bags, "--fiber", "18Dec2017a", "--set", "smoothing=0", "--out", str(out), *more]
 
 
+@pytest.mark.slow
 def test_fitted_fibre_meets_the_data_it_was_made_with(
     bags: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -60,6 +61,7 @@ def test_fitted_fibre_meets_the_data_it_was_made_with(
     assert all(row["rmsd_f0"]["whole"] < 5e-3 for row in rows)
 
 
+@pytest.mark.slow
 def test_features_alone(tmp_path: Path) -> None:
     table = {
         "pCa": [4.5, 6.1],
@@ -153,6 +155,7 @@ def own_bags(tmp_path_factory: pytest.TempPathFactory) -> str:
 DRAG = ["--model", "3state_coop+viscous_drag", "--starts", "1", "--no-intervals", "--processes", "0"]
 
 
+@pytest.mark.slow
 def test_a_mechanism_is_fitted_without_being_named_and_the_file_serves_the_bags(
     own_bags: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -175,6 +178,7 @@ def test_a_mechanism_is_fitted_without_being_named_and_the_file_serves_the_bags(
     assert line.endswith("isometric force is known at 2 levels of pCa; 5 are needed")
 
 
+@pytest.mark.slow
 def test_a_mechanism_left_at_its_null_is_said(
     own_bags: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -204,6 +208,7 @@ def test_what_would_have_been_passed_over(
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("more", "fitted", "absent"),
     [
@@ -227,6 +232,7 @@ def test_ordinary_errors_are_fitted_unless_asked_otherwise(
     assert sum(row["name"] == "pca_shift" for row in rows) == 2 * ("pca_shift" in fitted)
 
 
+@pytest.mark.slow
 def test_what_one_trial_cannot_show_is_said(bags: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(fit(bags, tmp_path / "x.yaml", *QUICK, "--hold-out", "pca=6.1")) == 0
     said = capsys.readouterr()

@@ -129,6 +129,7 @@ def test_parameters_are_listed_with_unit_and_range(capsys: pytest.CaptureFixture
     assert "1/(µM s)" in line
 
 
+@pytest.mark.slow
 def test_bench_writes_its_figures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "bench.json"
     assert main(["bench", "--study", "rhs", "--out", str(out)]) == 0

@@ -54,6 +54,7 @@ def inside(out: Path) -> set[str]:
     return {path.relative_to(out).as_posix() for path in out.rglob("*")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", RUNS)
 def test_one_rule_for_older_results(
     command: str, bags: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -130,6 +131,7 @@ def test_a_benchmark_is_made_anew_only_when_asked(tmp_path: Path, capsys: pytest
     assert older_cases(folder) == [case / "bags" / "trial_1", case / "fibre.yaml", folder / "benchmark.json"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("trial", "folder"), [("a/b", "a_b"), ("../../x", "_.._x"), ("", "_")])
 def test_a_trial_s_name_leads_out_of_no_folder(bags: Path, tmp_path: Path, trial: str, folder: str) -> None:
     """Neither is a bag written beside the results, nor one removed that only has such a name."""

@@ -169,6 +169,7 @@ def test_several_fibres_in_one_bag(tmp_path: Path, make: Make) -> None:
     assert np.array_equal(first.trials[0].force_n, second.trials[0].force_n)
 
 
+@pytest.mark.slow
 def test_real_fibres(shared_data: Path, make: Make) -> None:
     """The five rat fibres share conditions that were stated apart in files' names."""
     names = sorted(p.name for p in (shared_data / "recordings" / "rat_soleus_fibres").iterdir())

@@ -41,6 +41,7 @@ def test_everything_is_written_and_can_be_read(tmp_path: Path) -> None:
     assert not read_trial(out / NEXT).force_n.size
 
 
+@pytest.mark.slow
 def test_the_page_is_that_of_record_and_traces(tmp_path: Path) -> None:
     d, traces = nothing()
     write(tmp_path, d, Files({}, traces, None))

@@ -22,6 +22,9 @@ from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
 from xb_muscle_ros.trials.bag_writing import write_trial
 from xb_muscle_ros.trials.trial import Trial
 
+# What its tests share takes long to make.
+pytestmark = pytest.mark.slow
+
 OTHER = "14Dec2017b"
 PCAS = (4.5, 6.0, 6.2, 9.0)
 DRAG = 0.04

@@ -20,6 +20,9 @@ from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.trial import Trial
 from xb_muscle_ros.work import Options
 
+# What its tests share takes long to make.
+pytestmark = pytest.mark.slow
+
 SEVEN = (4.5, 5.8, 6.0, 6.2, 6.4, 6.6, 9.0)
 DRAG, STIFFNESS, HALF = 0.04, 2.0, 1.0
 

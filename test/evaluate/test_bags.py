@@ -63,6 +63,7 @@ def test_models_without_a_set_are_named(make: Maker) -> None:
     assert (list(found.scores), found.missing) == ([MEASURED, "2state"], ["2state_coop"])
 
 
+@pytest.mark.slow
 def test_all_sets_of_the_fibre_file_without_a_choice(make: Maker) -> None:
     (found,) = found_in(make(), models=None)
     assert set(found.scores) == {MEASURED, "hill_se", "2state", "3state_coop", "3state_coop_v3", "4state_coop"}
@@ -290,6 +291,7 @@ def test_a_recorded_release_gives_k_tr(make: Maker, recorded: Callable[..., Tria
     assert found.scores["3state_coop"]["k_tr"].value > 0.0
 
 
+@pytest.mark.slow
 def test_models_that_push_are_told_once_each(make: Maker, recorded: Callable[..., Trial]) -> None:
     """A release by a fifth of the length within 2 ms: a tendon would be slack, the models' spring is not."""
     slack = recorded()

@@ -107,6 +107,7 @@ def test_our_simulation_gives_the_same(model: str, golden: dict[str, SrsTable], 
     assert ours.rmsd["large"] == pytest.approx(theirs.rmsd["large"], abs=0.01)
 
 
+@pytest.mark.slow
 def test_how_long_a_fibre_settles_does_not_matter_to_the_scores(measured: SrsTable) -> None:
     """The authors settled for 2 s, which is not yet equilibrium at low calcium."""
     short, full = (score(simulated("3state_coop", FIBRES, settle_s=s), measured, TEXT, 11) for s in (2.0, None))

@@ -51,6 +51,7 @@ def bags(make: Maker) -> Path:
     return path.parent
 
 
+@pytest.mark.slow
 def test_recordings_to_files(bags: Path, tmp_path: Path) -> None:
     made = request(tmp_path / "out", bags)
     write(made, evaluate(made))
@@ -101,6 +102,7 @@ def test_tables_hold_what_the_sections_hold(bags: Path, tmp_path: Path) -> None:
     assert "no parameter set of its own" in text
 
 
+@pytest.mark.slow
 def test_processes_and_resuming_give_the_same_files(bags: Path, tmp_path: Path) -> None:
     run(request(tmp_path / "one", bags))
     run(request(tmp_path / "two", bags, work=Options(processes=2, quiet=True)))
@@ -196,6 +198,7 @@ def paper(out: Path, folder: Path, **changes: Any) -> Request:
     return request(out, empirical=small_table(folder), **changes)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small_grid")
 def test_the_papers_grid_to_files(tmp_path: Path) -> None:
     table = small_table(tmp_path)
@@ -261,6 +264,7 @@ def test_measured_fibres_without_a_file(tmp_path: Path) -> None:
         evaluate(request(tmp_path / "out", empirical=path))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small_grid")
 def test_a_cluster_gives_the_same_and_survives_a_killed_worker(bags: Path, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed", reason="Dask is not installed")
@@ -334,6 +338,7 @@ def test_the_one_file_given_serves_a_fibre_nobody_knows(make: Maker, tmp_path: P
     assert served == ["trials of fibre mine are compared with parameters of 18Dec2017a, the one file given"]
 
 
+@pytest.mark.slow
 def test_a_mechanism_at_its_null_is_said(make: Maker, tmp_path: Path) -> None:
     make()
     results = evaluate(request(tmp_path / "out", tmp_path / "bags", models=("3state_coop+viscous_drag",)))

@@ -43,6 +43,7 @@ def test_the_catalogue_has_every_mechanism_of_the_registry() -> None:
     assert set(CATALOGUE) == set(EXTRAS) | set(SWAPS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mechanism", [*EXTRAS, *SWAPS])
 def test_a_mechanism_is_fitted_away_from_its_start_on_a_trial_made_with_it(mechanism: str) -> None:
     entry, given = CATALOGUE[mechanism], loaded(mechanism)

@@ -173,6 +173,7 @@ def test_descent_with_one_coordinate_held(problem: Problem) -> None:
     assert found.cost < 0.5 * np.sum(objective.residuals(z) ** 2)
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10**6), memory=st.floats(0.5, 0.97))
 def test_scale_of_coloured_noise(seed: int, memory: float) -> None:

@@ -80,6 +80,7 @@ def test_written_fibre_file_says_where_it_comes_from(fitted: Fitted, tmp_path: P
     assert "Seed 1, 2 starts" in text
 
 
+@pytest.mark.slow
 def test_a_fit_is_the_same_wherever_and_again(problem: Problem, fitted: Fitted, tmp_path: Path) -> None:
     journal = tmp_path / "journal.jsonl"
     again = fit(problem, Settings(starts=2), Options(processes=2, quiet=True, journal=journal))

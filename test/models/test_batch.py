@@ -14,6 +14,7 @@ from xb_muscle_ros.models.fibre_file import load_fibre
 FIBRES = ("13Dec2017a", "13Dec2017b", "14Dec2017b", "18Dec2017a", "18Dec2017b", "19Dec2017a", "7Aug2018a")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["gaussian", "characteristics"])
 def test_batch_equals_single_steps_to_the_bit(method: str) -> None:
     batch = MuscleBatch([load_fibre(name, method=method) for name in FIBRES])

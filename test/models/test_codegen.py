@@ -56,6 +56,7 @@ def test_jacobian_by_lines_is_the_derivative() -> None:
             assert float(slope.subs(at)) == pytest.approx(exact, rel=1e-12)
 
 
+@pytest.mark.slow
 @given(z=arrays(float, 6, elements=st.floats(0.01, 0.9)), velocity=st.floats(-2.0, 2.0), calcium=st.floats(0.001, 32.0))
 def test_compiled_right_hand_side_is_the_blocks_own(
     muscle: Muscle, z: np.ndarray, velocity: float, calcium: float
@@ -144,6 +145,7 @@ def test_any_finite_input_gives_a_finite_state_or_a_named_violation(
     assert faults == "18Dec2017a"
 
 
+@pytest.mark.slow
 def test_a_process_that_compiled_and_one_that_loaded_agree_to_the_bit(tmp_path: Path) -> None:
     """Regression: fused multiply-adds came out differently in code compiled here and code loaded from the cache."""
     import os

@@ -15,6 +15,9 @@ from xb_muscle_ros.models.fibre_file import Fibre, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.registry import BASE_OF, METHODS, MODELS, compose, model_of_set
 
+# What its tests share takes long to make.
+pytestmark = pytest.mark.slow
+
 FIBRE = "18Dec2017a"
 RELEASED = ("2state", "3state_coop", "4state_coop", "hill_se")
 PCAS = (4.5, 6.1, 6.6, 9.0)

@@ -74,6 +74,7 @@ def test_a_stiff_series_element_is_none(compliant: str, rigid: str, values: dict
     np.testing.assert_allclose(with_element[inside], without[inside], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_softplus_with_the_resting_length_of_the_linear_spring_is_the_linear_spring() -> None:
     """Above rest the released sets' offset Fpe0 is a resting length below zero."""
     resting = -FULL["Fpe0"] / (FULL["kpe"] * FULL["gamma"])

@@ -59,6 +59,7 @@ def values_of(name: str, method: str, smoothing: float, released: str = "") -> d
     return complete({key: value for key, value in given.items() if key in wanted}, name, "test", method)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "method", "smoothing"), CASES, ids=str)
 def test_generated_code_steps_through_a_quick_release(name: str, method: str, smoothing: float) -> None:
     values = values_of(name, method, smoothing)

@@ -58,6 +58,7 @@ def test_a_models_equations_are_factored_as_by_sympy(model: str) -> None:
         assert factors.factored(signed(expression)) == sympy.factor_terms(sub_pre(expression))
 
 
+@pytest.mark.slow
 def test_shared_subexpressions_are_looked_at_once() -> None:
     """2⁶⁰ paths lead through this expression: what walks them all never ends."""
     expression = X

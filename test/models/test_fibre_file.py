@@ -193,6 +193,7 @@ def test_missing_file_is_named(tmp_path: Path) -> None:
         load_fibre(tmp_path / "none.yaml")
 
 
+@pytest.mark.slow
 @given(
     st.dictionaries(
         st.one_of(st.text(max_size=20), st.sampled_from(["fibre", "model", "models.3state_coop.f", "constants.f0_n"])),

@@ -14,6 +14,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import load_fibre
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("table", "largest"),
     [("3state_coop", 0.02), ("3state_coop_v3", 0.06), ("2state_xb", 0.02)],
@@ -30,6 +31,7 @@ def test_cells_agree(shared_data: Path, table: str, largest: float) -> None:
     assert [c for c in cells if c.error > largest] == []
 
 
+@pytest.mark.slow
 def test_four_states_agree_on_a_grid(shared_data: Path) -> None:
     """The authors' four-state table was made with 1,000 strain bins: fewer cells, since each takes its time."""
     cells = list(compare(shared_data / "golden_srs.json", "4state_coop", ("fixed",), every=(3, 3, 5, 3)))

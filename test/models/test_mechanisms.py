@@ -46,6 +46,7 @@ def test_every_mechanism_has_its_case_here() -> None:
     assert set(EFFECT) == set(EXTRAS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mechanism", EXTRAS)
 def test_absent_where_its_effect_is_zero_and_felt_where_it_is_not(mechanism: str, plain: np.ndarray) -> None:
     effect = EFFECT[mechanism]
@@ -64,6 +65,7 @@ def test_states_stay_within_their_bounds_through_fast_movement(mechanism: str) -
         assert np.all(np.isfinite(force(fibre_with(mechanism, **EFFECT[mechanism]), pca, length)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "mechanism", ["nonlinear_crossbridge", "phosphate", "length_dependent_activation", "weakly_bound_heads"]
 )
@@ -273,6 +275,7 @@ def test_heads_bear_curved_force_over_strain() -> None:
     np.testing.assert_allclose(out["force_ce_f0"], fibre.values["Fscale"] * borne, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_mechanisms_add_up_in_one_model(plain: np.ndarray) -> None:
     both = fibre_with("viscous_drag+static_calcium_stiffness", drag=0.02, calcium_stiffness=1.0)
     one = force(fibre_with("viscous_drag", drag=0.02)) - plain
@@ -280,6 +283,7 @@ def test_mechanisms_add_up_in_one_model(plain: np.ndarray) -> None:
     np.testing.assert_allclose(force(both) - plain, one + other, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mechanism", ["viscous_drag", "length_dependent_activation", "filament_overlap"])
 def test_hill_type_models_take_what_needs_no_heads(mechanism: str) -> None:
     effect = EFFECT[mechanism]

@@ -64,6 +64,7 @@ def test_strain_bins_survive() -> None:
     assert np.isfinite(muscle.outputs_of(states)["force_f0"]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("smoothing", [0.0, 100.0])
 def test_a_slack_spring_does_not_push_and_a_taut_one_is_the_same(smoothing: float) -> None:
     slack, pushing = (muscle_of(model, smoothing=smoothing) for model in ("3state_coop_slack", "3state_coop"))
@@ -115,4 +116,4 @@ def test_every_model_knows_its_slack_form() -> None:
     assert slack_of("2state_slack") is None
     for model in MODELS:
         slack = slack_of(model)
-        assert slack is None or row_of(slack).parallel is row_of(model).parallel
+        assert slack is None or row_of(slack).blocks["parallel"] is row_of(model).blocks["parallel"]

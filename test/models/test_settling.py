@@ -41,6 +41,7 @@ def test_the_quick_way_ends_where_the_slow_one_does(name: str, monkeypatch: pyte
             assert np.array_equal(muscle.settle(length, calcium), quick)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RELEASED)
 def test_smooth_functions_take_the_slow_way(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """They have further states of rest: of 2state at pCa 9, mean strains of -17000 power strokes."""

@@ -64,6 +64,7 @@ def _called(lines: Any) -> Any:
     return call
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("s", [np.array([0.3]), np.array([[0.7, 9.0], [1.1, 9.0]])[:, 0], np.array([2])])
 @pytest.mark.parametrize("x", [0.25, 7, -0.4, math.nan])
 def test_every_construct_is_what_numba_makes_of_it(tmp_path: Path, s: np.ndarray, x: float) -> None:
@@ -83,6 +84,7 @@ def test_what_is_no_straight_line_is_refused_by_name(tmp_path: Path) -> None:
         _called(straight_line(module.loops))(np.zeros(1), 0.5, np.zeros(2), np.zeros(3))
 
 
+@pytest.mark.slow
 def test_a_models_steps_are_what_numba_makes_of_them(tmp_path: Path) -> None:
     """The same text, once with straight lines for LLVM and once all for Numba: every state and output to the bit."""
     composition = compose("3state_coop")

@@ -106,6 +106,7 @@ EVENT = st.tuples(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 3])
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

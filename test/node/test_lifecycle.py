@@ -21,6 +21,7 @@ def change(driver: Any, transition: str) -> bool:
     return bool(driver.link.call(ChangeState, "change_state", request, timeout_s=60.0).success)
 
 
+@pytest.mark.slow
 def test_every_transition(start: Callable[..., Any]) -> None:
     """Up and down twice, with answers only while active, and the state held while not."""
     driver = start(wait=False, autostart=False, mode="lockstep")
@@ -48,6 +49,7 @@ def test_every_transition(start: Callable[..., Any]) -> None:
     assert driver.process.wait() == 0
 
 
+@pytest.mark.slow
 def test_shutdown_from_active(start: Callable[..., Any]) -> None:
     """The process ends with its lifecycle."""
     driver = start(mode="realtime")
@@ -56,6 +58,7 @@ def test_shutdown_from_active(start: Callable[..., Any]) -> None:
     assert "Traceback" not in driver.process.log()
 
 
+@pytest.mark.slow
 def test_a_transition_that_is_not_allowed_is_refused(start: Callable[..., Any]) -> None:
     """And the node is still there."""
     driver = start(wait=False, autostart=False)
@@ -92,6 +95,7 @@ def test_reset_before_configuring_says_so(start: Callable[..., Any]) -> None:
         driver.link.reset()
 
 
+@pytest.mark.slow
 def test_a_node_that_started_by_itself_tells_why_a_later_configuration_fails(start: Callable[..., Any]) -> None:
     """Nobody else is there to tell it then."""
     driver = start(mode="lockstep", meet=False)

@@ -65,6 +65,7 @@ def before(domain: int, request: pytest.FixtureRequest) -> Iterator[Callable[...
         driver.process.stop()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
 @pytest.mark.parametrize("stamp_s", [0.0, 1.0])
 def test_calcium_published_once_before_the_node_starts(before: Callable[..., Any], mode: str, stamp_s: float) -> None:
@@ -93,6 +94,7 @@ def test_calcium_published_once_before_the_node_starts(before: Callable[..., Any
     assert int(driver.link.reset().calcium) == 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
 def test_plain_publishers_are_heard_beside_one_that_keeps(before: Callable[..., Any], mode: str) -> None:
     """As `ros2 topic pub` sends: volatile."""
@@ -143,6 +145,7 @@ def test_overrides_of_one_topic_leave_the_other_alone(domain: int, tmp_path: Pat
             driver.link.close()
 
 
+@pytest.mark.slow
 def test_a_flood_that_loses_messages_is_a_warning_with_the_count(start: Callable[..., Any]) -> None:
     """All that were sent are taken or counted as lost; a reset begins anew."""
     from diagnostic_msgs.msg import DiagnosticStatus
@@ -172,6 +175,7 @@ def test_a_flood_that_loses_messages_is_a_warning_with_the_count(start: Callable
     assert driver.report(lambda r: True)["lost: length"] == "0"
 
 
+@pytest.mark.slow
 def test_input_that_is_refused_for_good_is_an_error_with_the_remedy(start: Callable[..., Any]) -> None:
     """More than an hour ahead: nothing is taken, also after the sender has fallen silent, until ~/reset."""
     from diagnostic_msgs.msg import DiagnosticStatus
@@ -193,6 +197,7 @@ def test_input_that_is_refused_for_good_is_an_error_with_the_remedy(start: Calla
     assert driver.ask(9001.0, 1.0) is not None
 
 
+@pytest.mark.slow
 def test_two_nodes_of_one_name_say_so(start: Callable[..., Any]) -> None:
     """The second one finds the first."""
     from xb_muscle_ros.node.client.process import NodeProcess

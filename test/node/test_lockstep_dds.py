@@ -137,6 +137,7 @@ def test_reset_makes_earlier_stamps_good(fresh: Any) -> None:
     assert fresh.ask(0.0, 1.0).effort[0] == first
 
 
+@pytest.mark.slow
 def test_a_bag_in_a_loop(start: Callable[..., Any]) -> None:
     """Under use_sim_time every turn gives the same bits, with one notice; without, and after all, it is refused."""
     driver = start(mode="lockstep", use_sim_time=True)

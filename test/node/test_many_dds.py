@@ -65,6 +65,7 @@ def play(driver: Any, first: int, last: int) -> list[list[float]]:
     return answers
 
 
+@pytest.mark.slow
 def test_arrays_by_name_in_any_order(three: Any) -> None:
     """Files, common and own constants, and forces that are those of one fibre alone, to the bit."""
     three.link.reset()
@@ -159,6 +160,7 @@ def test_killed_and_started_again_all_go_on_to_the_bit(
     assert play(second, 20, 40) == whole[20:]
 
 
+@pytest.mark.slow
 def test_realtime_serves_many_from_one_file(start: Callable[..., Any]) -> None:
     """All have the same file; priority and locked memory work, or are said not to."""
     names = [f"m{i}" for i in range(20)]
@@ -183,6 +185,7 @@ def test_realtime_serves_many_from_one_file(start: Callable[..., Any]) -> None:
     assert report["fibre"] == "m0, m1, m2 and 17 more"
 
 
+@pytest.mark.slow
 def test_fibres_can_be_others_after_a_clean_up(start: Callable[..., Any]) -> None:
     """Their parameters go and come with them; one name alone is a list as well."""
     from lifecycle_msgs.msg import Transition
@@ -209,6 +212,7 @@ def test_fibres_can_be_others_after_a_clean_up(start: Callable[..., Any]) -> Non
     assert list(driver.ask(1.0, 1.0, name=["c"]).name) == ["c"]
 
 
+@pytest.mark.slow
 def test_fibres_that_do_not_fit_fail_the_configuration(domain: int) -> None:
     """One line that names the remedy."""
     from xb_muscle_ros.node.client.process import NodeProcess

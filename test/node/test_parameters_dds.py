@@ -13,6 +13,7 @@ FIBRE = "18Dec2017a"
 F = "models.3state_coop.f"
 
 
+@pytest.mark.slow
 def test_descriptors_come_from_the_table(lockstep: Any) -> None:
     """Type, range, unit, and whether it can be set."""
     from rcl_interfaces.msg import ParameterType
@@ -83,6 +84,7 @@ def test_a_bad_set_is_refused_whole(lockstep: Any, bad: dict[str, object], reaso
     assert lockstep.link.parameters([good]) == before
 
 
+@pytest.mark.slow
 def test_a_running_grid_keeps_its_size(start: Callable[..., Any]) -> None:
     """A state has as many bins as it has; another rate is fine."""
     driver = start(mode="lockstep", method="characteristics")
@@ -94,6 +96,7 @@ def test_a_running_grid_keeps_its_size(start: Callable[..., Any]) -> None:
     assert driver.ask(1.0, 1.0) is not None
 
 
+@pytest.mark.slow
 def test_parameters_on_top_of_a_file(start: Callable[..., Any]) -> None:
     """The name and the set in use may differ from those of the file; what was given survives a clean-up."""
     driver = start(mode="lockstep", fibre="left_soleus", model="2state")

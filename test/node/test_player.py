@@ -77,6 +77,7 @@ def assert_same_bits(simulated: Any, expected: dict[str, Any]) -> None:
         np.testing.assert_array_equal(found, values, err_msg=name)
 
 
+@pytest.mark.slow
 def test_force_over_dds_is_offline_force_bit_for_bit(node: Any, muscle: Muscle) -> None:
     """Through real DDS and back, with calcium that changes on the way; twice, from one node."""
     from xb_muscle_ros.node.client.player import play_live
@@ -98,6 +99,7 @@ def test_the_offline_replay_agrees_with_the_node(muscle: Muscle) -> None:
     assert_same_bits(simulate_trial(muscle, trial), loop(muscle, trial))
 
 
+@pytest.mark.slow
 def test_calcium_that_came_late_is_noticed_and_the_trial_played_again(
     node: Any, muscle: Muscle, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -162,6 +164,7 @@ def test_realtime_is_refused(start: Callable[..., Any]) -> None:
         play_live([TRIAL], namespace=driver.namespace, domain_id=driver.domain)
 
 
+@pytest.mark.slow
 def test_a_second_publisher_is_refused(start: Callable[..., Any]) -> None:
     """Here it is the driver of these tests."""
     from xb_muscle_ros.node.client.player import play_live
@@ -173,6 +176,7 @@ def test_a_second_publisher_is_refused(start: Callable[..., Any]) -> None:
         play_live(trials, namespace=driver.namespace, domain_id=driver.domain)
 
 
+@pytest.mark.slow
 def test_no_answer_names_trial_and_stamp(node: Any) -> None:
     """A sample that the node refuses is never answered."""
     from xb_muscle_ros.node.client.player import play_live

@@ -23,6 +23,7 @@ def feed(driver: Any, seconds: float, fresh_stamps: bool = True, enough: int | N
         driver.link.wait_for(lambda: False, 0.01)
 
 
+@pytest.mark.slow
 def test_forces_come_at_the_rate_and_never_violate(start: Callable[..., Any]) -> None:
     """Also with the length carried on by its velocity; reset and bad input do not stop it."""
     driver = start(mode="realtime", rate_hz=RATE_HZ, extrapolate=True)
@@ -52,6 +53,7 @@ def test_forces_come_at_the_rate_and_never_violate(start: Callable[..., Any]) ->
     assert float(report["input age (s)"]) < 5.0
 
 
+@pytest.mark.slow
 def test_unstamped_messages_are_taken(start: Callable[..., Any]) -> None:
     """`ros2 topic pub` leaves stamps at zero; the steady clock needs none."""
     driver = start(mode="realtime", rate_hz=RATE_HZ)
@@ -60,6 +62,7 @@ def test_unstamped_messages_are_taken(start: Callable[..., Any]) -> None:
     assert int(driver.report(lambda r: True)["refused"]) == 0
 
 
+@pytest.mark.slow
 def test_nodes_in_different_namespaces_do_not_mix(start: Callable[..., Any]) -> None:
     """Only the one that is fed answers."""
     fed, idle = start(mode="realtime", rate_hz=RATE_HZ), start(mode="realtime", rate_hz=RATE_HZ)
@@ -69,6 +72,7 @@ def test_nodes_in_different_namespaces_do_not_mix(start: Callable[..., Any]) -> 
     assert not idle.forces
 
 
+@pytest.mark.slow
 def test_rate_can_be_set_while_inactive(start: Callable[..., Any]) -> None:
     """And counts from the next activation on."""
     from lifecycle_msgs.msg import Transition
@@ -88,6 +92,7 @@ def test_rate_can_be_set_while_inactive(start: Callable[..., Any]) -> None:
     assert 30 < len(driver.forces) < 120
 
 
+@pytest.mark.slow
 def test_node_and_plain_timer_are_measured_side_by_side(domain: int) -> None:
     """All figures of a short run; which is better is not for a test to say."""
     from xb_muscle_ros.bench.timing import run_beside_plain_timer
@@ -104,6 +109,7 @@ def test_node_and_plain_timer_are_measured_side_by_side(domain: int) -> None:
         assert {"overruns", "dropped_ticks", "rate_hz", "refused", "load"} <= figures.keys()
 
 
+@pytest.mark.slow
 def test_the_way_there_and_back_is_measured(domain: int) -> None:
     """With several fibres in each message."""
     from xb_muscle_ros.bench.timing import run_roundtrip

@@ -38,6 +38,7 @@ def play(driver: Any, first: int, last: int) -> list[tuple[float, float, float]]
     return answers
 
 
+@pytest.mark.slow
 def test_killed_and_started_again_it_goes_on_to_the_bit(start: Callable[..., Any], tmp_path: Path) -> None:
     """SIGKILL in the middle of a trial, a new process, and the forces of an uninterrupted run."""
     path = tmp_path / "state.json"
@@ -115,6 +116,7 @@ def test_what_is_wrong_comes_back_in_the_answer(start: Callable[..., Any], tmp_p
     assert play(driver, 4, 12) == whole[4:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at_start", [False, True])
 def test_realtime_goes_on_with_the_force_it_had(start: Callable[..., Any], tmp_path: Path, at_start: bool) -> None:
     """A new process needs neither length nor calcium to go on, nor a call where it loads the state by itself."""
@@ -139,6 +141,7 @@ def test_realtime_goes_on_with_the_force_it_had(start: Callable[..., Any], tmp_p
     assert second.forces[-1].effort[0] == pytest.approx(force, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "words"),
     [("", "'state_file' is empty; name the file there"), ("{}", "has format")],

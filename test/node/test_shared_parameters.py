@@ -221,6 +221,7 @@ def dump(node: Any) -> dict[str, object]:
     return {name: p.value for name, p in node.get_parameters_by_prefix("").items() if not name.startswith("qos")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loaded", ["at the start", "while configured"])
 @pytest.mark.parametrize("many", [False, True])
 def test_another_file_after_a_dump_is_the_other_fibre(gate: Callable[..., Any], loaded: str, many: bool) -> None:
@@ -285,6 +286,7 @@ def _flat(tree: dict[str, Any], above: str = "") -> dict[str, object]:
     return made
 
 
+@pytest.mark.slow
 def test_a_shared_file_does_not_stop_the_node(start: Callable[..., Any], tmp_path: Path) -> None:
     """One warning names the keys that are not its own."""
     path = tmp_path / "all.yaml"

@@ -66,6 +66,7 @@ def assert_ends_with_one_line(domain: int, arguments: list[str], expected: list[
         assert words in log
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", BAD_FILES)
 def test_bad_parameter_file_ends_with_code_2_and_one_line(domain: int, tmp_path: Path, case: str) -> None:
     """The value, the range and the remedy, and nothing else."""
@@ -73,6 +74,7 @@ def test_bad_parameter_file_ends_with_code_2_and_one_line(domain: int, tmp_path:
     assert_ends_with_one_line(domain, ["--params-file", str(fibre_file(tmp_path, change))], expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", BAD_ARGUMENTS)
 def test_bad_arguments_end_with_code_2_and_one_line(domain: int, tmp_path: Path, case: str) -> None:
     """Also where ROS itself finds fault with them."""
@@ -87,6 +89,7 @@ def test_bad_arguments_end_with_code_2_and_one_line(domain: int, tmp_path: Path,
     assert_ends_with_one_line(domain, arguments, expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mode", "number"), [("lockstep", signal.SIGTERM), ("realtime", signal.SIGINT)])
 def test_signals_end_the_node_cleanly(start: Callable[..., Any], mode: str, number: signal.Signals) -> None:
     """Exit code 0 and no traceback."""
@@ -96,6 +99,7 @@ def test_signals_end_the_node_cleanly(start: Callable[..., Any], mode: str, numb
     assert "Traceback" not in driver.process.log()
 
 
+@pytest.mark.slow
 def test_a_signal_while_starting_ends_the_node_cleanly(domain: int) -> None:
     """Python is long at importing; that is no time for tracebacks either."""
     from xb_muscle_ros.node.client.process import NodeProcess
@@ -110,6 +114,7 @@ def test_a_signal_while_starting_ends_the_node_cleanly(domain: int) -> None:
         assert "Traceback" not in child.log()
 
 
+@pytest.mark.slow
 def test_parameter_file_alone_starts_a_node(start: Callable[..., Any]) -> None:
     """A fibre file is a ROS parameter file; whole numbers stand for floating ones."""
     path = find_fibre_file(FIBRE)
@@ -123,6 +128,7 @@ def test_parameter_file_alone_starts_a_node(start: Callable[..., Any]) -> None:
     assert values["models.2state.kappa"] > 0.0
 
 
+@pytest.mark.slow
 def test_quality_of_service_can_be_overridden(start: Callable[..., Any], tmp_path: Path) -> None:
     """A best-effort sender can drive lockstep, if the user says so."""
     path = tmp_path / "qos.yaml"

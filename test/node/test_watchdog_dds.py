@@ -21,6 +21,7 @@ def feed(driver: Any, enough: Callable[[], bool], calcium: bool = True) -> None:
     assert driver.link.wait_for(step, 30.0), driver.process.log()
 
 
+@pytest.mark.slow
 def test_realtime_says_what_it_does_and_when_it_ends(start: Callable[..., Any]) -> None:
     """Level, age and behaviour in diagnostics, one line in the log at each change, and force that falls and returns."""
     from diagnostic_msgs.msg import DiagnosticStatus
@@ -43,6 +44,7 @@ def test_realtime_says_what_it_does_and_when_it_ends(start: Callable[..., Any]) 
     assert log.count("length is back after ") >= 1
 
 
+@pytest.mark.slow
 def test_lockstep_only_reports(start: Callable[..., Any]) -> None:
     """Without messages nothing steps, and the next one is answered as if it had come at once."""
     from diagnostic_msgs.msg import DiagnosticStatus

@@ -29,6 +29,7 @@ def nodes(new_domain: Callable[[], int]) -> Iterator[int]:
         yield domain
 
 
+@pytest.mark.slow
 def test_over_dds_is_as_in_process_and_repeats(nodes: int) -> None:
     from xb_muscle_ros.plant.live import over_ros
 
@@ -55,6 +56,7 @@ def test_elastic_tendons_over_dds(nodes: int) -> None:
     assert np.max(np.abs(live.length_change_l0 - inside.length_change_l0)) < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("elastic", [False, True])
 def test_knee_over_dds(nodes: int, elastic: bool) -> None:
     """Without the parallel element, which the plant takes out of the node's fibre; moved before release as well."""

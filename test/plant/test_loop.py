@@ -31,6 +31,7 @@ def standing() -> dict[str, Trace]:
     return {trace.model: trace for trace in traces}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("elastic", [False, True])
 def test_stance_starts_at_rest_and_stays_until_it_falls(model: str | None, elastic: bool) -> None:

@@ -97,6 +97,7 @@ def episodes(heard: list[tuple[float, float]]) -> list[list[tuple[float, float]]
     return [heard[a:b] for a, b in itertools.pairwise(starts)]
 
 
+@pytest.mark.slow
 def test_lockstep_survives_the_death_of_either_side_and_namespaces_do_not_mix(stage: Stage) -> None:
     """Two loops on one graph: one suffers, the other repeats its episodes bit for bit all the while."""
     for space in ("/a", "/b"):
@@ -126,6 +127,7 @@ def test_lockstep_survives_the_death_of_either_side_and_namespaces_do_not_mix(st
     assert "Traceback" not in "".join(stage.log(name) for name in stage.processes)
 
 
+@pytest.mark.slow
 def test_realtime_survives_the_death_of_either_side(stage: Stage) -> None:
     """The body waits for its muscles, the muscles notice that length stays away; both go on when the other is back."""
     stage.muscle("/c", "realtime")
@@ -144,6 +146,7 @@ def test_realtime_survives_the_death_of_either_side(stage: Stage) -> None:
     assert "Traceback" not in "".join(stage.log(name) for name in stage.processes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("given", "words"),
     [({"scene": "elbow"}, "allowed is ankle or knee"), ({"duration": 1.0}, "did you mean 'duration_s'?")],
@@ -165,6 +168,7 @@ def test_arguments_that_are_not_of_ros_are_refused() -> None:
             begin("plant_node", arguments)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["lockstep", "realtime"])
 def test_a_body_that_falls_ends_its_episode_with_reason_code_and_last_state(stage: Stage, mode: str) -> None:
     """No fibre can follow it any further; the node that would refuse its lengths is not asked for ever."""
@@ -179,6 +183,7 @@ def test_a_body_that_falls_ends_its_episode_with_reason_code_and_last_state(stag
     assert "Traceback" not in log
 
 
+@pytest.mark.slow
 def test_a_muscle_node_that_takes_no_more_lengths_ends_the_episode(stage: Stage) -> None:
     """Here another sender has moved its time on; the reason comes from its diagnostics."""
     from xb_muscle_ros.node.client.link import Link

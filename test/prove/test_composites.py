@@ -53,6 +53,7 @@ def planned(worlds: dict[str, World]) -> list[Planned]:
     return made
 
 
+@pytest.mark.slow
 def test_case_follows_from_its_seed(pair: Composite) -> None:
     again = make_composite(pair.spec, 7, 1)
     assert all(np.array_equal(a, b) for a, b in zip(pair.recorded, again.recorded, strict=True))

@@ -10,6 +10,9 @@ from xb_muscle_ros.prove.generator.effects import EFFECTS, OUTSIDE
 from xb_muscle_ros.prove.generator.truth import Truth, study_forces
 from xb_muscle_ros.prove.generator.world import Mesh, Stimulus, World
 
+# What its tests share takes long to make.
+pytestmark = pytest.mark.slow
+
 Array = np.ndarray
 RELAXED, HALF, FULL = range(3)
 STRETCH, HOLD = slice(201, 285), slice(-250, None)

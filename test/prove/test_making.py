@@ -31,6 +31,7 @@ def case() -> Single:
     return make_single(Spec("single", (Name.STATIC_CALCIUM_STIFFNESS.value,), (0.01,), "3state_coop"), 7, 1)
 
 
+@pytest.mark.slow
 def test_case_is_of_the_size_asked_for(case: Single) -> None:
     assert case.refitted.rms == pytest.approx(0.01, rel=0.15)
     assert case.before > case.refitted.rms
@@ -41,6 +42,7 @@ def test_case_is_of_the_size_asked_for(case: Single) -> None:
     assert {4.5, 9.0} <= set(entry["pca"].values())
 
 
+@pytest.mark.slow
 def test_case_follows_from_its_seed(case: Single) -> None:
     again = make_single(case.spec, 7, 1)
     assert all(np.array_equal(a, b) for a, b in zip(case.recorded, again.recorded, strict=True))

@@ -204,6 +204,7 @@ def test_results_of_published_runs_are_read(run: str) -> None:
     assert load_benchmark(folder)["cases"] == sorted(rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_key_of_the_former_version_is_scored(kind: str, tmp_path: Path) -> None:
     """`key_2.json`: open cases, results and scores by the version that wrote keys of version 2."""

@@ -98,6 +98,7 @@ def test_the_fit_ends_where_the_fibre_is_moved_again() -> None:
     assert still_until(TIME, length, 1.02) == pytest.approx(3.999)
 
 
+@pytest.mark.slow
 @given(st.floats(0.5, 20.0))
 def test_the_rate_of_an_exponential_is_found_again(k: float) -> None:
     found = redevelopment(TIME, recovering(k), 1.02, 6.0)
@@ -106,6 +107,7 @@ def test_the_rate_of_an_exponential_is_found_again(k: float) -> None:
     assert found.end_f0 == pytest.approx(0.9, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_standard_error_of_k_tr_allows_for_slow_noise() -> None:
     """Noise of 50 ms memory: with residuals taken for independent the error would be a seventh of the true one."""
     rng = np.random.default_rng(8)

@@ -72,6 +72,7 @@ def assert_covers(off: list[float]) -> None:
         assert inside == pytest.approx(share, abs=3.0 * np.sqrt(share * (1.0 - share) / n) + 0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "setting",
     [
@@ -94,6 +95,7 @@ def test_srs_in_hum(speed: float, hum_hz: float) -> None:
     assert np.mean(np.abs(off) < 2.0) > 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "setting",
     [

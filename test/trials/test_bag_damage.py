@@ -44,6 +44,7 @@ def _check_prefix(read: Trial, whole: Trial) -> None:
         assert _is_prefix(getattr(read, name), getattr(whole, name)), name
 
 
+@pytest.mark.slow
 def test_every_cut_gives_a_prefix_or_a_user_error(tmp_path: Path, trial: Trial) -> None:
     write_trial(tmp_path / "bag", trial)
     whole = read_trial(tmp_path / "bag")
@@ -86,6 +87,7 @@ def test_a_cut_folder_keeps_its_facts(tmp_path_factory: pytest.TempPathFactory, 
     assert len(read.warnings) == 1
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(where=st.floats(0.0, 1.0, exclude_max=True), value=st.integers(0, 255))
 def test_a_changed_byte_never_ends_in_a_traceback(

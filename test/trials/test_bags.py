@@ -55,6 +55,7 @@ def trials(draw: st.DrawFn) -> Trial:
     return Trial(facts, *series(1), *series(1), *series(0))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(trials())
 def test_round_trip_is_bit_exact(made: Trial) -> None:

@@ -147,6 +147,7 @@ def resume(tmp_path: Path) -> list[Any]:
     return run(work_tasks.count, tasks(str(tmp_path / "marks"), SLEEP_S), options)
 
 
+@pytest.mark.slow
 def test_an_interrupt_ends_all_and_keeps_what_is_done(tmp_path: Path) -> None:
     with at_work(tmp_path, SLEEP_S) as process:
         wait_until(lambda: kept(tmp_path) >= 3, "no results")

@@ -78,6 +78,7 @@ def test_evidence_is_that_of_sums_over_everything_unknown(case: str) -> None:
     assert adjustment(es) == pytest.approx(math.log(together) - sum(math.log(a) for a in alone), abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_centre_and_its_error_are_those_of_the_sums(case: str) -> None:
     es = CASES[case]

@@ -21,6 +21,7 @@ from xb_muscle_ros.diagnose.result import FORMAT, Diagnosis, Verdict
 from xb_muscle_ros.errors import UserError
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(diagnoses(holes=False))
 def test_finite_records_come_back_as_they_were(d: Diagnosis) -> None:

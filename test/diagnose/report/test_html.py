@@ -100,6 +100,7 @@ def plain(text: str) -> str:
     return " ".join(text.replace("\u00a0", " ").split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_every_sample_makes_a_page_with_headline_summary_and_figures(name: str) -> None:
     d = ALL[name]().diagnosis
@@ -184,6 +185,7 @@ def test_long_tables_say_what_they_leave_out() -> None:
     assert "Parameters of 12 of 40 fibres shown" in words
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(diagnoses())
 def test_any_record_makes_a_page_without_gaps(d: Diagnosis) -> None:
@@ -200,6 +202,7 @@ HOSTILE = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", [0, 1])
 def test_names_may_hold_anything(turn: int) -> None:
     """Fibres, trials, phases, components and lines of text."""

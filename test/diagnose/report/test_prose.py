@@ -26,6 +26,7 @@ def said(d: Diagnosis) -> str:
     return " ".join(summary(d))
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(diagnoses())
 def test_nothing_said_is_other_than_the_numbers(d: Diagnosis) -> None:

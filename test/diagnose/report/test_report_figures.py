@@ -48,6 +48,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     return seen
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("long", [False, True])
 def test_nothing_written_lies_on_anything_else(drawn: list[Any], size: tuple[int, int, int, int], long: bool) -> None:
@@ -60,6 +61,7 @@ def test_nothing_written_lies_on_anything_else(drawn: list[Any], size: tuple[int
         assert high_mm < 250.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ALL)
 def test_samples_have_their_figures(drawn: list[Any], name: str) -> None:
     figures = draw_all(ALL[name]())
@@ -67,6 +69,7 @@ def test_samples_have_their_figures(drawn: list[Any], name: str) -> None:
     assert all(touching_ones == [] and out == [] for touching_ones, out, *_ in drawn)
 
 
+@pytest.mark.slow
 def test_what_is_left_out_is_said(drawn: list[Any]) -> None:
     figures = draw_all(many(40, 5, 30, 31))
     captions = {name: figure.caption for name, figure in figures.items() if figure}
@@ -91,6 +94,7 @@ def test_without_held_out_trials_fitted_ones_are_shown_and_said(drawn: list[Any]
     assert "Held-out force RMSD (% F$_0$)" in drawn[1][2]
 
 
+@pytest.mark.slow
 def test_where_the_answer_is_the_base_one_model_is_shown_and_that_is_said(drawn: list[Any]) -> None:
     figures = draw_all(unexplained())
     written = {text for _, _, texts, _ in drawn for text in texts}
@@ -117,6 +121,7 @@ def test_no_error_no_figure() -> None:
     assert set(draw_all(Sample(bare, ())).values()) == {None}
 
 
+@pytest.mark.slow
 def test_every_number_may_be_unknown(drawn: list[Any]) -> None:
     nan = float("nan")
     d, traces = five_fibres()
@@ -138,6 +143,7 @@ def test_every_number_may_be_unknown(drawn: list[Any]) -> None:
     assert not any("nan" in text for _, _, texts, _ in drawn for text in texts)
 
 
+@pytest.mark.slow
 def test_labels_of_one_thing_are_one_label(drawn: list[Any]) -> None:
     sample = one_fibre()
     draw_all(sample)
@@ -184,6 +190,7 @@ def test_kinds_are_told_apart_without_colour(drawn: list[Any], monkeypatch: pyte
     assert {None, "/////"} <= hatches
 
 
+@pytest.mark.slow
 def test_captions_have_no_mathematics(drawn: list[Any]) -> None:
     assert isinstance(one_fibre().diagnosis, Diagnosis)
     for figure in draw_all(five_fibres()).values():
@@ -227,11 +234,13 @@ def structure(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[dict[str, Any]]
     return dict(zip(names, seen, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", AXES)
 def test_axes_say_what_they_show_and_in_which_unit(name: str, structure: dict[str, list[dict[str, Any]]]) -> None:
     assert set().union(*(axis["labels"] for axis in structure[name])) == AXES[name]
 
 
+@pytest.mark.slow
 def test_figures_have_one_artist_for_each_thing_shown(structure: dict[str, list[dict[str, Any]]]) -> None:
     d = one_fibre().diagnosis
     # Three trials: measured, base and answer above; zero, base and answer below. Then one row for each trial and all.

@@ -43,7 +43,8 @@ def test_a_fit_that_has_everything_is_promised_little(system: System, drag_fit: 
 def test_what_only_a_fit_can_tell_has_every_start_of_the_catalogue(base_fit: Fit) -> None:
     system = System(given_fibre("2state"), (), np.empty(0), 1e-3)
     bare: Any = SimpleNamespace(system=system, fit=base_fit)
-    found = promise(bare, BLIND[0])
+    assert Name.THIN_FILAMENT_COOPERATIVITY in BLIND
+    found = promise(bare, Name.THIN_FILAMENT_COOPERATIVITY)
     assert np.isnan(found.gain)
     assert np.isnan(found.mean_square_f0)
     assert {start["koop"] for start in found.starts} == {1.0, 3.0, 10.0}

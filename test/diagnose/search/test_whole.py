@@ -43,6 +43,7 @@ def assert_same(one: Written, other: Written) -> None:
         assert value == pytest.approx(other.outputs[name], rel=EXACT, abs=EXACT), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", MODELS)
 def test_everything_absent_is_the_base(model: str) -> None:
     given = given_fibre(model)
@@ -70,6 +71,7 @@ def mechanisms_alone() -> list[tuple[str, Name]]:
     return [(model, name) for model in BASES for name in beside(given_fibre(model))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("model", "name"), mechanisms_alone(), ids=str)
 def test_one_mechanism_in_the_whole_is_the_small_model_with_it(model: str, name: Name) -> None:
     given = given_fibre(model)
@@ -94,6 +96,7 @@ def test_one_mechanism_in_the_whole_is_the_small_model_with_it(model: str, name:
     assert max([*changes, *rates]) > 1e-6
 
 
+@pytest.mark.slow
 def test_a_frame_with_nothing_else_is_the_small_model_of_that_frame() -> None:
     for model, frame in (("2state", FRAMES[:1]), ("2state_rigid", FRAMES), ("hill", FRAMES[1:2])):
         given = given_fibre(model)
@@ -161,6 +164,7 @@ def test_a_mechanism_of_the_fibre_s_own_stays() -> None:
     assert Name.VISCOUS_DRAG not in beside(given)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["3state_coop"])
 def test_compiled_forces_of_a_stretch_are_the_base_s(model: str, gaussian_whole: Fibre) -> None:
     """Steps of 1 ms, as recordings have them: more states than the base's bear on the step's error estimate alone."""

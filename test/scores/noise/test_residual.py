@@ -21,6 +21,7 @@ def covariance(time_s: Array, point: int) -> Array:
     return np.asarray(SHARES[point] * decaying + (1.0 - SHARES[point]) * np.eye(time_s.size))
 
 
+@pytest.mark.slow
 def test_noise_is_found_behind_what_a_fit_took_of_it() -> None:
     """Slow regressors take the slow part of coloured noise away; restricted, its size and autocorrelation come back."""
     random = np.random.default_rng(3)

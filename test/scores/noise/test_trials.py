@@ -67,6 +67,7 @@ def covers(model: NoiseModel, trials: Sequence[Trial], noise: Sequence[Array]) -
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["exponentials", "power", "active"])
 @pytest.mark.parametrize("make", [quick, slow])
 def test_noise_beside_a_transient_is_of_the_right_size(made: Any, make: Any, shape: str) -> None:
@@ -84,6 +85,7 @@ def test_noise_beside_a_transient_is_of_the_right_size(made: Any, make: Any, sha
     assert np.mean(covered) > 0.85
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(st.integers(0, 10_000), st.floats(0.001, 0.3), st.floats(0.0, 1.0), st.sampled_from(["exponentials", "power"]))
 def test_size_whatever_the_memory(made: Any, seed: int, tau_s: float, share: float, shape: str) -> None:
@@ -93,6 +95,7 @@ def test_size_whatever_the_memory(made: Any, seed: int, tau_s: float, share: flo
         assert 0.5 < noise.sd_f0 / sd < 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [quick, slow])
 def test_false_alarms_on_noise_taken_from_curves(made: Any, make: Any) -> None:
     """Studies without a mismatch, whose noise is estimated beside transients that a fit took away."""

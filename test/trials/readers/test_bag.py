@@ -158,6 +158,7 @@ def test_our_own_topics_are_the_default(tmp_path: Path) -> None:
     assert read_trial(tmp_path / "again").facts == read_back.facts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("length", "words"),
     [

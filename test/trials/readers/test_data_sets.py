@@ -17,6 +17,9 @@ from xb_muscle_ros.trials.readers.mapping import load_mapping
 from xb_muscle_ros.trials.readers.settings import ImportSettings
 from xb_muscle_ros.trials.trial import Trial
 
+# What its tests share takes long to make.
+pytestmark = pytest.mark.slow
+
 
 class DataSet(NamedTuple):
     mapping: str
