@@ -51,6 +51,7 @@ def of_file(folder: Path, **changes: str) -> str:
     (folder / "own_block.py").write_text(BLOCK.format(**USUAL | changes), encoding="utf-8")
     importlib.invalidate_caches()
     fingerprint._tree.cache_clear()
+    fingerprint._code.cache_clear()
     block: Any = importlib.import_module("own_block").Own
     return fingerprint.fingerprint(replace(MODELS["2state"], extras=(block,)).composed("own", Gaussian))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import copy
 import functools
 import hashlib
 import sys
@@ -78,18 +77,19 @@ def _is_library(name: str) -> bool:
 
 @functools.cache
 def _tree(file: Path) -> ast.Module:
-    return ast.parse(file.read_text(encoding="utf-8"))
-
-
-def _code(name: str) -> str:
     """What a module computes: without comments, without its texts, and without what a catalogue says of its blocks."""
-    file = _file(name)
-    assert file is not None
-    tree = copy.deepcopy(_tree(file))
+    tree = ast.parse(file.read_text(encoding="utf-8"))
     for node in ast.walk(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
             node.body = [line for line in node.body if not _only_says(line)]
-    return ast.dump(tree)
+    return tree
+
+
+@functools.cache
+def _code(name: str) -> str:
+    file = _file(name)
+    assert file is not None
+    return ast.dump(_tree(file))
 
 
 def _only_says(line: ast.stmt) -> bool:
