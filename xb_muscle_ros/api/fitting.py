@@ -13,27 +13,19 @@ from xb_muscle_ros.api.tables import dataframe, drawn
 from xb_muscle_ros.api.telling import Lines, Tell
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import matching, refuse_older, write_json
-from xb_muscle_ros.fit.coordinates import (
-    Choice,
-    fault_coordinates,
-    free_names,
-    parameter_coordinates,
-    population_choices,
-)
-from xb_muscle_ros.fit.data import FitTrial, fit_trials
+from xb_muscle_ros.fit.asked import choices_of, nuisances_of, starting_fibre, with_population
+from xb_muscle_ros.fit.coordinates import fault_coordinates, parameter_coordinates
+from xb_muscle_ros.fit.data import fit_trials
 from xb_muscle_ros.fit.features import F0_ANCHOR, Feature, measured
-from xb_muscle_ros.fit.ordinary import shown_by
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.report import as_json, write_fitted
 from xb_muscle_ros.fit.run import Fitted, Settings
 from xb_muscle_ros.fit.run import fit as fitted_to
 from xb_muscle_ros.fit.split import held_out
-from xb_muscle_ros.fit.start import begun, start_lines, with_constants
+from xb_muscle_ros.fit.start import start_lines
 from xb_muscle_ros.fit.table import table
-from xb_muscle_ros.measurement.artefacts import ARTEFACTS
-from xb_muscle_ros.models.fibre_file import Fibre, load_fibre
+from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.trials.bag_files import remove_results
-from xb_muscle_ros.trials.trial import Trial
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -264,17 +256,17 @@ def fit(
         raise UserError(f"trials are of fibres {', '.join(fibres)}; fit one fibre at a time")
 
     ties = dict(tie or {})
-    begin, notes = _start(start, found_trials, free, fix, ties, set or {}, features_of)
+    begin, notes = starting_fibre(start, found_trials, free, fix, ties, set or {}, features_of)
     out = held_out([t.facts for t in found_trials], hold_out, train, split)
     if split and not any(out):
         notes.append(f"--split {split} holds none of the trials out: all of them are fitted")
     prepared = fit_trials(found_trials, out, window == "whole", weight or {})
     training = [t for t in prepared if not t.held_out and t.weight > 0.0]
-    names, sds, unseen = _nuisances([nuisance] if isinstance(nuisance, str) else nuisance, training)
+    names, sds, unseen = nuisances_of([nuisance] if isinstance(nuisance, str) else nuisance, training)
     notes += unseen
-    choices = _choices(bound or {}, prior or {})
+    choices = choices_of(bound or {}, prior or {})
     if prior_fibers:
-        choices, told = _of_population(begin, choices, prior_fibers, free, fix, ties)
+        choices, told = with_population(begin, choices, prior_fibers, free, fix, ties)
         notes += told
     coordinates = parameter_coordinates(begin, free, fix, ties, choices)
     coordinates += fault_coordinates(names, [t.name for t in training], [t.solution for t in training], sds)
@@ -299,86 +291,3 @@ def fit(
     source = f"fitted with xb_muscle_ros.fit to {len(training)} trials; started from {provenance['start']}"
     values = replace(problem.fibre_at(fitted.best.z), path=None, source=source)
     return FitResult(values, found, table(found), tuple(lines), fitted)
-
-
-def _start(
-    given: Fibre,
-    trials: Sequence[Trial],
-    free: Sequence[str] | None,
-    fix: Sequence[str],
-    ties: Mapping[str, str],
-    kept: Mapping[str, float],
-    features_of: str | None,
-) -> tuple[Fibre, list[str]]:
-    """The fibre to start from, with name and constants of the one that was measured, and lines on these."""
-    fibre, lines = with_constants(begun(given, free, fix, ties, kept), [t.facts for t in trials])
-    return replace(fibre, name=trials[0].facts.fibre if trials else features_of or fibre.name), lines
-
-
-def _nuisances(
-    given: Sequence[str] | None, training: Sequence[FitTrial]
-) -> tuple[list[str], dict[str, float], list[str]]:
-    """Names of faults, standard deviations of those that the user gave one, and lines on what is left out."""
-    ordinary, unseen = shown_by(training)
-    sets: dict[str, Sequence[str]] = {"all": tuple(ARTEFACTS), "ordinary": ordinary, "none": ()}
-    names: list[str] = []
-    sds: dict[str, float] = {}
-    for text in ["ordinary"] if given is None else given:
-        name, equals, sd = text.partition("=")
-        if name in sets and equals:
-            raise UserError(
-                f"--nuisance {text}: '{name}' takes no SD, since each has its own unit; name them one by one"
-            )
-        if name == "none" and given is not None and len(given) > 1:
-            raise UserError("--nuisance none is given with others; give it alone")
-        if name in sds:
-            raise UserError(f"--nuisance {name} is given an SD twice; give it once")
-        names += sets.get(name, (name,))
-        if equals:
-            sds[name] = number(sd, f"--nuisance {name}")
-    left = [name for name in unseen if name not in names]
-    asked = given is None or "ordinary" in given
-    lines = (
-        [f"not fitted, since nothing in the trials shows it: {', '.join(left)}"] if asked and left and training else []
-    )
-    return names, sds, lines
-
-
-def _choices(bound: Mapping[str, tuple[float, float]], prior: Mapping[str, tuple[float, float]]) -> dict[str, Choice]:
-    made: dict[str, Choice] = {}
-    for name, (low, high) in bound.items():
-        made[name] = replace(made.get(name, Choice()), lower=low, upper=high)
-    for name, (mean, sd) in prior.items():
-        made[name] = replace(made.get(name, Choice()), prior_mean=mean, prior_sd=sd)
-    return made
-
-
-def _of_population(
-    fibre: Fibre,
-    choices: Mapping[str, Choice],
-    others: Sequence[str | Path],
-    free: Sequence[str] | None,
-    fix: Sequence[str],
-    ties: Mapping[str, str],
-) -> tuple[dict[str, Choice], list[str]]:
-    """Choices with priors of what other fibres' sets are like, and a line on parameters of which they say nothing."""
-    sets = [load_fibre(name, fibre.model, for_fit=True) for name in others]
-    names = free_names(fibre, free, fix, ties)
-    found = population_choices(sets, choices, names)
-    default = [name for name in names if name not in found and name not in choices]
-    return found, [f"--prior-fibers says nothing of {', '.join(default)}: default priors"] if default else []
-
-
-def number(text: str, where: str) -> float:
-    """A number from text.
-
-    Raises:
-        UserError: it is none.
-    """
-    try:
-        value = float(text)
-    except ValueError:
-        raise UserError(f"{where}: '{text}' is not a number") from None
-    if value != value:
-        raise UserError(f"{where}: '{text}' is not a number")
-    return value

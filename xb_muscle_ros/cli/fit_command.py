@@ -75,7 +75,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Fit, print the tables, write the files."""
-    from xb_muscle_ros.api.fitting import check_out, fit, number
+    from xb_muscle_ros.api.fitting import check_out, fit
+    from xb_muscle_ros.fit.asked import number
 
     folder = check_out(arguments.out, arguments.overwrite)
     found = fit(
@@ -130,7 +131,7 @@ def _pairs(given: list[str], option: str) -> list[tuple[str, str]]:
 
 
 def _range(text: str, where: str) -> tuple[float, float]:
-    from xb_muscle_ros.api.fitting import number
+    from xb_muscle_ros.fit.asked import number
 
     low, colon, high = text.partition(":")
     if not colon:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 import functools
 import math
 from typing import Any, NoReturn
@@ -31,16 +30,13 @@ _ON_THE_WAY = 1e-4
 _WARM: set[Any] = set()
 
 
-class Result(enum.Enum):
-    """How a stretch of integration ended; every member but OK tells the remedy."""
-
-    OK = ""
-    NOT_FINITE = "check the input for jumps and the parameters for extremes, or take a smaller step"
-    OUT_OF_BOUNDS = "check the parameters, or take a smaller step"
-    TOO_MANY_STEPS = "the equations are stiffer than the tolerance allows; loosen it or check the parameters"
-
-
-_RESULTS = tuple(Result)
+# Remedies by result code of the compiled loops.
+_REMEDIES = (
+    "",
+    "check the input for jumps and the parameters for extremes, or take a smaller step",
+    "check the parameters, or take a smaller step",
+    "the equations are stiffer than the tolerance allows; loosen it or check the parameters",
+)
 
 
 class Muscle:
@@ -295,11 +291,9 @@ class Muscle:
             StateViolation: a state is at fault.
             UserError: the step size is.
         """
-        result = _RESULTS[code]
+        remedy = _REMEDIES[code]
         if fault < 0:
-            raise UserError(f"fibre {self.fibre.name}: integration stopped at t = {time_s:.6g} s; {result.value}")
+            raise UserError(f"fibre {self.fibre.name}: integration stopped at t = {time_s:.6g} s; {remedy}")
         name = self._states[fault].name
         lower, upper = self._states[fault].lower, self._states[fault].upper
-        raise StateViolation(
-            self.fibre.name, name, time_s, float(state[fault]), f"{lower:g} to {upper:g}", result.value
-        )
+        raise StateViolation(self.fibre.name, name, time_s, float(state[fault]), f"{lower:g} to {upper:g}", remedy)
