@@ -132,12 +132,17 @@ def _amiss(block: Block, entry: Entry, table: Mapping[str, Parameter]) -> Iterat
         yield "its entry names no effect; name the parameter that is 0 where it is absent"
     sizes = {"size": entry.size, "reach": entry.reach, **{f"shape of '{n}'": sd for n, sd in entry.shape.items()}}
     for what, size in sizes.items():
-        if not (math.isfinite(size) and size > 0.0):
+        if not isinstance(size, (int, float)):
+            yield f"{what} of its entry is {size!r}; give a number"
+        elif not (math.isfinite(size) and size > 0.0):
             yield f"{what} of its entry is {size:g}; give a positive number"
     try:
         starts = entry.starting_values({name: row.default or 1.0 for name, row in table.items()})
     except Exception as error:
         yield f"its starts cannot be computed ({type(error).__name__}: {error}); mend start_from"
+        return
+    if not isinstance(starts, (tuple, list)) or not all(isinstance(start, Mapping) for start in starts):
+        yield f"starts of its entry is {starts!r}; give a tuple of mappings, ({{...}},) for a single one"
         return
     if not starts or any(start.keys() != starts[0].keys() for start in starts):
         yield "its entry has no starts, or starts that differ in their parameters; give each the same"
@@ -146,6 +151,8 @@ def _amiss(block: Block, entry: Entry, table: Mapping[str, Parameter]) -> Iterat
     for name, value in [(n, v) for values in (*starts, entry.off) for n, v in values.items()]:
         if name not in table:
             yield f"its entry gives a value for '{name}', which is no parameter; correct the name"
+        elif not isinstance(value, (int, float)):
+            yield f"its entry gives {name} = {value!r}; give a number"
         elif not table[name].lower <= value <= table[name].upper:
             row = table[name]
             yield f"its entry gives {name} = {value:g}; allowed is {row.lower:g} to {row.upper:g}"
@@ -184,7 +191,7 @@ def refuse_wrong(block: Block, models: Sequence[tuple[Model, Model]]) -> None:
                 if not math.isclose(off[name], value, rel_tol=_EXACT, abs_tol=_EXACT):
                     raise UserError(
                         f"{where}: with {_listed(entry.absent)} it is not absent: {name.replace('_', ' ')} is "
-                        f"{off[name]:.6g}, without it {value:.6g}; make it do nothing there, or say frame=True"
+                        f"{off[name]:.6g}, without it {value:.6g}; make it do nothing there"
                     )
     if not acts:
         raise UserError(f"{where}: it changes nothing at its start values; use its effect in one of the hooks")

@@ -14,6 +14,7 @@ from itertools import product
 from types import MappingProxyType
 from typing import Any
 
+from xb_muscle_ros import plugins
 from xb_muscle_ros.distribution.base import Representation
 from xb_muscle_ros.distribution.gaussian import Gaussian
 from xb_muscle_ros.distribution.grid import Characteristics, ConservativeFixedGrid, FixedGrid
@@ -147,7 +148,10 @@ def _with_mechanism(row: Row, name: str, taken: dict[str, str], where: str) -> R
         _take(place_of(name), name, taken, where)
         return replace(row, extras=(*row.extras, extra))
     if name not in SWAPS:
-        raise UserError(f"{where}: mechanism '{name}' is not known{suggest(name, (*EXTRAS, *SWAPS))}")
+        told = f"{where}: mechanism '{name}' is not known{suggest(name, (*EXTRAS, *SWAPS))}"
+        if not any(discovery.is_outside(block) for block in BLOCKS):
+            told += f"{' ' if told.endswith('?') else '; '}(of your own none is there: {plugins.VARIABLE} is not set)"
+        raise UserError(told)
     block = SWAPS[name]
     slot = block.family.value
     if slot not in row.blocks:

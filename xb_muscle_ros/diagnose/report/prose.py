@@ -16,6 +16,8 @@ from xb_muscle_ros.diagnose.words import SCALES, chance, human, joined, quantity
 MOST = 6
 """Sentences of a summary."""
 _MOST_CAUSES, _MOST_CHANGES = 4, 3
+# Of candidates that are not named.
+_WORTH_A_WORD = 0.1
 # Parameters that moved less than this share are not worth a word.
 _CHANGED = 0.02
 _HIGHER = {1: "higher than", -1: "lower than", 0: "by turns higher and lower than"}
@@ -41,12 +43,18 @@ def headline(d: Diagnosis) -> str:
         return f"{word}: these recordings do not call for another model"
     if d.verdict is Verdict.PARAMETERS:
         return f"{word}: other values of the same parameters are enough"
-    return f"{word}: the base model differs by {say.force(d.before.train_rmsd_f0)}; {_none_of(d)} explains it"
+    return f"{word}: the base model differs by {say.force(d.before.train_rmsd_f0)}; {_none_of(d)}"
 
 
 def _none_of(d: Diagnosis) -> str:
-    count = len(d.components)
-    return f"none of the {count} candidates" if count > 1 else "no candidate"
+    """That no candidate is named, and which one comes first where one has some probability."""
+    none = f"none of the {len(d.components)} candidates" if len(d.components) > 1 else "no candidate"
+    first = max(d.components, key=lambda c: c.inclusion_probability, default=None)
+    if first is None or not first.inclusion_probability >= _WORTH_A_WORD:
+        return f"{none} explains it"
+    rivals = joined([human(name) for name in first.not_separable_from], "or")
+    rivals = f", not separable from {rivals}" if rivals else ""
+    return f"{none} is probable enough to be named, first of them {_with_probability(first)}{rivals}"
 
 
 def _with_probability(c: Component) -> str:
@@ -231,4 +239,4 @@ def _next(d: Diagnosis) -> list[str]:
         return _missing(d)
     if d.named:
         return ["Next: test the augmented fibre on recordings that this study did not have."]
-    return [f"Next: look at the residual; {_none_of(d)} explains it."]
+    return [f"Next: look at the residual; {_none_of(d)}."]
