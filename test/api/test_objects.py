@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import xb_muscle_ros as xb
+from xb_muscle_ros.api import diagnosing
+from xb_muscle_ros.diagnose.outputs import read
 
 FIBRE = "18Dec2017a"
 EXACT = {"smoothing": 0.0}
@@ -156,3 +160,14 @@ def test_figures_are_handed_over_and_not_written(
 def test_results_are_short_to_look_at(made: xb.SimulationResult) -> None:
     assert repr(made) == f"SimulationResult({FIBRE}, 3state_coop, 2 trials: amp383_rt100ms_pca45, amp383_rt100ms_pca61)"
     assert repr(xb.replay(made, FIBRE)).startswith(f"ReplayResult({FIBRE}, 3state_coop, 2 trials, RMSD ")
+
+
+def test_bags_given_twice_are_said(repo_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copy(repo_root / "test" / "diagnose" / "report" / "format_2.json", tmp_path / "diagnosis.json")
+    kept = read(tmp_path)
+    monkeypatch.setattr(diagnosing, "diagnosed", lambda *_: (kept, SimpleNamespace(augmented={}, protocol=None)))
+    (bag,) = xb.simulate(FIBRE, pca=4.5, as_measured=True).save(tmp_path / "bags")
+    told: list[str] = []
+    found = xb.diagnose([bag, bag], FIBRE, processes=0, tell=told.append)
+    assert f"bags that were given more than once are taken once: {bag}" in told
+    assert told[-1] in found.diagnosis.notes

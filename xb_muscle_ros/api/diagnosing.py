@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ from xb_muscle_ros.diagnose.component import Component
 from xb_muscle_ros.diagnose.effort import QUICK, Effort
 from xb_muscle_ros.diagnose.error_sds import error_sd_lines, error_sds_of
 from xb_muscle_ros.diagnose.feature_tables import read_features
-from xb_muscle_ros.diagnose.intake import read_fibres, studies_of
+from xb_muscle_ros.diagnose.intake import given_twice, read_fibres, studies_of
 from xb_muscle_ros.diagnose.outputs import Files, older_results, write
 from xb_muscle_ros.diagnose.report.prose import headline, summary
 from xb_muscle_ros.diagnose.report.terminal import terminal_text
@@ -224,6 +224,7 @@ def diagnose(
     of_fibres = {study.fibre.name: study.trials for study in studies}
     data, table = (None if path is None else read_features(Path(path), of_fibres) for path in (features, predict))
     found, files = diagnosed(studies, QUICK if quick else Effort(), seed, work, data, table, sds)
+    found = replace(found, notes=(*found.notes, *given_twice(paths)))
     lines = Lines(tell)
     lines.say(*found.warnings, *found.notes)
     return DiagnosisResult(found, files.augmented, files.protocol, tuple(lines), files)
