@@ -6,6 +6,7 @@ import ast
 import dataclasses
 import doctest
 import inspect
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -118,3 +119,12 @@ def test_python_of_the_readme_runs(monkeypatch: pytest.MonkeyPatch, capsys: pyte
     for block in blocks:
         exec(compile(block.split("```")[0], "README.md", "exec"), {"__name__": "__main__"})
     assert capsys.readouterr().out
+
+
+def test_a_folder_of_the_same_name_is_not_taken_for_the_package(tmp_path: Path) -> None:
+    # Beside a clone, whose folder is called like the package.
+    (tmp_path / "xb_muscle_ros").mkdir()
+    code = "import xb_muscle_ros as xb; print(xb.load_fibre('18Dec2017a').name)"
+    env = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=env, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("18Dec2017a\n", "")
