@@ -47,30 +47,32 @@ def _seed(text: str) -> int:
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, print the answer, say where the report is."""
-    from xb_muscle_ros.diagnose.error_sds import error_sds_of
+    from xb_muscle_ros.api.diagnosing import diagnose
     from xb_muscle_ros.diagnose.outputs import older_results
-    from xb_muscle_ros.diagnose.report.terminal import terminal_text
-    from xb_muscle_ros.diagnose.run import diagnose_bags
     from xb_muscle_ros.files import refuse_older
 
     out: Path = arguments.out
     refuse_older(older_results(out), arguments.overwrite)
-    found = diagnose_bags(
+    found = diagnose(
         arguments.bags,
         arguments.fiber,
-        out,
-        arguments.quick,
-        arguments.seed,
-        arguments.model,
-        arguments.method,
-        common.work_options_of(arguments, journal=out / "journal.jsonl"),
-        known=common.known_of(arguments),
-        only=arguments.trials_of,
+        model=arguments.model,
+        method=arguments.method,
+        reference_length=arguments.reference_length,
+        f0=arguments.f0,
+        trials_of=arguments.trials_of,
         features=arguments.features,
         predict=arguments.predict,
-        error_sds=error_sds_of(arguments.nuisance),
+        nuisance=arguments.nuisance,
+        quick=arguments.quick,
+        seed=arguments.seed,
+        processes=arguments.processes,
+        scheduler=arguments.scheduler,
+        journal=out / "journal.jsonl",
+        progress=True,
+        tell=lambda _: None,  # They stand in what is printed at the end.
     )
-    print(terminal_text(found))
-    for name in ("report.html", "diagnosis.json", *found.augmented.values()):
-        print(out / name)
+    print(found)
+    for path in found.save(out, overwrite=True):
+        print(path)
     return 0
