@@ -154,6 +154,42 @@ WRONG: Mapping[str, tuple[dict[str, Any], str]] = {
 }  # fmt: skip
 
 
+STRETCH = State("own_stretch", "1", "stretch of a spring between the filaments, power strokes", -1e3, 1e3)
+
+
+@pytest.mark.parametrize(
+    ("kinetics", "told"),
+    [
+        (lambda self, q: (0, q.own_drag), None),
+        (lambda self, q: (0, 2 * q.own_drag), "at a ce_velocity of 5 power strokes/s its states change inner_force by"),
+        (lambda self, q: (q.own_drag, q.own_drag), "at a ce_velocity of 0 power strokes/s"),
+    ],
+)
+def test_kinetics_of_an_inner_force_are_those_of_its_states(kinetics: Any, told: str | None) -> None:
+    block = made(
+        needs=Needs.HEADS,
+        states=(STRETCH,),
+        inner_force=lambda self, q: q.own_drag * q.own_stretch,
+        inner_kinetics=kinetics,
+        derivatives=lambda self, q: {"own_stretch": q.ce_velocity},
+    )
+    if told is None:
+        tried(block)
+    else:
+        with pytest.raises(UserError, match=told):
+            tried(block)
+
+
+def test_an_inner_force_of_the_length_itself_is_refused() -> None:
+    block = made(
+        needs=Needs.HEADS,
+        inner_force=lambda self, q: q.own_drag * q.length_change,
+        inner_kinetics=lambda self, q: (0, q.own_drag / q.gamma),
+    )
+    with pytest.raises(UserError, match="its states change inner_force by 0 1/s"):
+        tried(block)
+
+
 @pytest.mark.parametrize("what", WRONG)
 def test_what_is_wrong_is_refused(what: str) -> None:
     members, told = WRONG[what]

@@ -7,6 +7,7 @@ import math
 import random
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 from xb_muscle_ros.distribution.grid import BINS, RANGE, REGRID
 from xb_muscle_ros.errors import UserError
@@ -29,6 +30,8 @@ _TAKEN = re.compile(
 # Numbers agree so far where two models are the same.
 _EXACT = 1e-9
 _STATES = 6
+# For slopes by central differences.
+_STEP_S = 1e-6
 
 
 def refuse_incomplete(blocks: Sequence[Block]) -> None:
@@ -180,6 +183,7 @@ def refuse_wrong(block: Block, models: Sequence[tuple[Model, Model]]) -> None:
         for state in _some_states(without, model):
             base, on = (_evaluated(where, m, started | state) for m in (without, model))
             acts = acts or any(on[name] != value for name, value in base.items() if name in on)
+            _refuse_untrue(where, block, started | state)
             if entry.frame or block.family is not Family.EXTRA:
                 continue
             # Its own states stay at rest where they do not move; others may be anywhere.
@@ -195,6 +199,34 @@ def refuse_wrong(block: Block, models: Sequence[tuple[Model, Model]]) -> None:
                     )
     if not acts:
         raise UserError(f"{where}: it changes nothing at its start values; use its effect in one of the hooks")
+
+
+def _refuse_untrue(where: str, block: Block, values: Mapping[str, float]) -> None:
+    """Refuse kinetics of an inner force that are not those of its states: steps would go wrong without a word."""
+    hooks = ("inner_force", "inner_kinetics")
+    if not issubclass(block, Extra) or all(getattr(block, hook) is getattr(Extra, hook) for hook in hooks):
+        return
+    extra = block()
+
+    def of(hook: str, at: Mapping[str, float]) -> Any:
+        return getattr(extra, hook)(Quantities(at, block.name, None))
+
+    for velocity in (0.0, 5.0):
+        at = {**values, "ce_velocity": velocity}
+        try:
+            rates, (rate, stiffness) = of("derivatives", at), of("inner_kinetics", values)
+            ahead, behind = ({**at, **{n: at[n] + h * r for n, r in rates.items()}} for h in (_STEP_S, -_STEP_S))
+            found = (of("inner_force", ahead) - of("inner_force", behind)) / (2.0 * _STEP_S)
+        except AttributeError:
+            # It asks for what other blocks make of the states.
+            return
+        told = rate + stiffness * velocity
+        if not math.isclose(found, told, rel_tol=1e-5, abs_tol=1e-6):
+            raise UserError(
+                f"{where}: at a ce_velocity of {velocity:g} power strokes/s its states change inner_force by {found:.6g} "
+                f"1/s, by inner_kinetics it is {told:.6g}; return the rate at constant length and the change per "
+                "power stroke, of a state that follows ce_velocity"
+            )
 
 
 def _listed(values: Mapping[str, float]) -> str:
