@@ -223,8 +223,8 @@ def _refuse_untrue(where: str, block: Block, values: Mapping[str, float]) -> Non
         told = rate + stiffness * velocity
         if not math.isclose(found, told, rel_tol=1e-5, abs_tol=1e-6):
             raise UserError(
-                f"{where}: at a ce_velocity of {velocity:g} power strokes/s its states change inner_force by {found:.6g} "
-                f"1/s, by inner_kinetics it is {told:.6g}; return the rate at constant length and the change per "
+                f"{where}: at a ce_velocity of {velocity:g} power strokes/s its states change inner_force by "
+                f"{found:.6g} 1/s, by inner_kinetics it is {told:.6g}; return the rate at constant length and the change per "
                 "power stroke, of a state that follows ce_velocity"
             )
 
