@@ -224,8 +224,8 @@ def _refuse_untrue(where: str, block: Block, values: Mapping[str, float]) -> Non
         if not math.isclose(found, told, rel_tol=1e-5, abs_tol=1e-6):
             raise UserError(
                 f"{where}: at a ce_velocity of {velocity:g} power strokes/s its states change inner_force by "
-                f"{found:.6g} 1/s, by inner_kinetics it is {told:.6g}; return the rate at constant length and the change per "
-                "power stroke, of a state that follows ce_velocity"
+                f"{found:.6g} 1/s, by inner_kinetics it is {told:.6g}; return the rate at constant length and the "
+                "change per power stroke, of a state that follows ce_velocity"
             )
 
 
