@@ -56,6 +56,6 @@ def scale_of(noise: ResidualNoise) -> Scale:
     if not sizes.size:
         return Scale(LEAST_SD_F0, 1.0)
     squares = sizes * noise.variance_f0
-    # Trials with large residuals say how they hang together; each has two independent samples at least.
+    # Trials with large residuals decide on the autocorrelation; each has two independent samples at least.
     lengths = [min(max(noise.autocorrelation_samples(i), 1.0), 0.5 * n) for i, n in enumerate(sizes)]
     return Scale(float(np.sqrt(np.sum(squares) / np.sum(sizes))), float(np.average(lengths, weights=squares)))

@@ -69,7 +69,7 @@ class Sized:
         return self._force(concealed) - self._plain_force
 
     def of_artefacts(self, artefacts: Artefacts) -> LinearFit:
-        """What is left of all that artefacts change beyond the ordinary artefacts, by a linear refit of the base."""
+        """Residual of all that artefacts change beyond the ordinary ones, after a linear refit of the base."""
         world = dressed([], self._base)
         both = [
             [f.recorded(force, i) for i, force in enumerate(study_forces(world, f.given(self._study), _COARSEST))]

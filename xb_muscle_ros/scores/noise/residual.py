@@ -28,7 +28,7 @@ LEAST_SD_F0 = 1e-4
 _ROUNDS, _FINE_ROUNDS = 3, 4
 # Points of the grid with less of the probability than this are left out.
 _IMPROBABLE = 1e-6
-# A process that decays within more than this share of a trial is not told apart from a drift there.
+# A process that decays within more than this share of a trial cannot be separated from a drift there.
 _SLOWEST = 0.25
 # A trial has this share of its samples left beside the fit at least.
 _LEAST_LEFT = 0.1
