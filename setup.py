@@ -63,6 +63,7 @@ setup(
     ],
     extras_require={
         "mujoco": ["mujoco>=3.1"],
+        "body": ["mujoco>=3.4", "myo-sim>=0.2.4"],
         "dask": ["cloudpickle>=2.0", "dask>=2024.1", "distributed>=2024.1"],
         "casadi": ["casadi>=3.6"],
         "pandas": ["pandas>=2.0"],
@@ -72,6 +73,7 @@ setup(
             "distributed",
             "ipykernel",
             "mujoco",
+            "myo-sim",
             "nbclient",
             "pandas",
             "pytest",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import os
+import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -42,7 +43,17 @@ def files() -> tuple[Path, ...]:
 
 def entry_points() -> tuple[importlib.metadata.EntryPoint, ...]:
     """Entry points of `GROUP`, in order of name."""
+    # Every installed package's names cost 10 to 30 ms at each start, and nearly always there are none of the group.
+    if not any(_declares(file) for folder in sys.path for file in Path(folder).glob("*-info/entry_points.txt")):
+        return ()
     return tuple(sorted(importlib.metadata.entry_points(group=GROUP), key=lambda point: (point.name, point.value)))
+
+
+def _declares(file: Path) -> bool:
+    try:
+        return GROUP in file.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return False
 
 
 def texts() -> dict[str, str]:

@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 import yaml
 
+from xb_muscle_ros import fast_yaml
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.models.catalogue import starts_for, swapped_in
 from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked, complete
@@ -108,7 +109,7 @@ def load_fibre(
     """
     path = find_fibre_file(name_or_path)
     try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+        tree = fast_yaml.load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(f"fibre file {path} cannot be read: {error}") from error
     except yaml.YAMLError as error:

@@ -36,7 +36,7 @@ def silent_files(arguments: Sequence[str], node: str) -> list[str]:
 
 def _tree(name: str) -> Any:
     try:
-        return yaml.safe_load(Path(name).read_text(encoding="utf-8"))
+        return fast_yaml.load(Path(name).read_text(encoding="utf-8"))
     except (OSError, ValueError, yaml.YAMLError):
         # ROS has read it already, in its own way; there is nothing to add.
         return {"/**": {_BELOW: {"unread": True}}}

@@ -14,8 +14,9 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from xb_muscle_ros import fast_yaml
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials import fast_yaml, ros_types
+from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bag_files import METADATA, mcap_files
 from xb_muscle_ros.trials.mcap_records import Message, Recording, read_recording
 

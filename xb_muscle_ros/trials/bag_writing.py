@@ -14,8 +14,9 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.rosbag2.enums import CompressionMode
 from rosbags.rosbag2.storage_mcap import McapWriter
 
+from xb_muscle_ros import fast_yaml
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials import fast_yaml, ros_types
+from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bag_files import check_replaceable
 from xb_muscle_ros.trials.custom_data import facts_to_custom_data
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated

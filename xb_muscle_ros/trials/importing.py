@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import yaml
 
+from xb_muscle_ros import fast_yaml
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials import fast_yaml
 from xb_muscle_ros.trials.bag_files import METADATA, clear_leftovers, mcap_files, plain
 from xb_muscle_ros.trials.bags import write_trial
 from xb_muscle_ros.trials.mcap_records import MAGIC
