@@ -32,10 +32,10 @@ def passive_f0(change: float, fl_min: float, fl_max: float, optimum: float = 0.0
     return float(PassiveForceLength().inner_force(quantities(change, fl_min, fl_max, optimum, fp_max)) * FSCALE)
 
 
-@pytest.mark.parametrize("fl_min, fl_max", CURVES)
+@pytest.mark.parametrize(("fl_min", "fl_max"), CURVES)
 def test_both_curves_are_mujoco_s(fl_min: float, fl_max: float) -> None:
     mujoco = pytest.importorskip("mujoco", reason="needs the extra mujoco")
-    # range 0..1 of a length range 0..1: lengths are in units of the optimum; a velocity of 0 leaves force-velocity at 1.
+    # Range 0 to 1 of a length range 0 to 1: lengths are in units of the optimum. Velocity 0: force-velocity is at 1.
     f0, fp_max = 1.0, 1.3
     prm = np.array([0.0, 1.0, f0, 200.0, fl_min, fl_max, 1.5, fp_max, 1.2])
     found = np.linspace(-0.2, 4.5, 4001)
@@ -64,7 +64,7 @@ def test_slopes_are_continuous_and_those_of_the_curves(
     change: float, curve: tuple[float, float, float], by: float
 ) -> None:
     """Two points closer than `by` differ in slope by no more than the largest curvature times `by`."""
-    fl_min, fl_max, optimum = curve
+    fl_min, fl_max, _ = curve
     curvature = max(1.0 / ((1.0 - fl_min) / 2.0) ** 2, 1.0 / ((fl_max - 1.0) / 2.0) ** 2)
     (behind, first), (ahead, second) = share(change, *curve), share(change + by, *curve)
     assert abs(second - first) <= curvature * by * (1.0 + 1e-6) + 1e-9
