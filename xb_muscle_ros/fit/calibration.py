@@ -21,8 +21,7 @@ from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.fit.problem import Problem, moves_simulation, touches
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS, Scope
 from xb_muscle_ros.models.muscle import Muscle
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # How well the model is trusted to know isometric force, F0; all samples of it count as one.
 _FORCE_SD_F0 = 0.005

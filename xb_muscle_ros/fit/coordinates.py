@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS, Scope
@@ -16,8 +15,6 @@ from xb_muscle_ros.mechanisms import Entry
 from xb_muscle_ros.models.catalogue import mechanisms_of
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.parameters import PARAMETERS
-
-Array = npt.NDArray[np.float64]
 
 FITTED_BY_THE_PAPER = (
     "f", "k11", "k21", "k22", "dLcrit", "kon", "koop", "kappa", "n", "JF", "vmax", "kse", "kse0", "kpe", "Fpe0",

@@ -14,9 +14,7 @@ from xb_muscle_ros.scores.rmsd import windows
 from xb_muscle_ros.scores.steady import steady_part
 from xb_muscle_ros.simulation.offline import calcium_per_step
 from xb_muscle_ros.trials.stamps import to_ns
-from xb_muscle_ros.trials.trial import Trial
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array, Trial
 
 _ARRAYS = ("time_s", "length_l0", "calcium_um", "force_time_s", "measured_f0")
 

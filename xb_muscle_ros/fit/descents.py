@@ -7,16 +7,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.noise import Scale, noise_at, scale_of
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.solve import Objective, Solution, descend
 from xb_muscle_ros.fit.training import Training
+from xb_muscle_ros.trials.trial import Array
 from xb_muscle_ros.work import Options, run
-
-Array = npt.NDArray[np.float64]
 
 
 def start_task(task: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.fit.solve import Objective, Solution
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 DATA, PRIOR, BOUND, UNSEEN, UNSETTLED = "data", "prior", "bound", "nothing", "search"
 """Ends of an interval; a bound of others is ``bound of k21``. Only data close one."""

@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError, naming
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.simulation.stretches import onset_stiffness, stretched_and_back, waited
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 KINDS = ("isometric_force", "srs_test", "srs_conditioning")
 

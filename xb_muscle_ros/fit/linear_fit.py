@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Directions of less than this share of the largest curvature, in units of each coordinate's own, are not seen.
 _UNSEEN = 1e-9

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.distribution.gaussian import Gaussian
 from xb_muscle_ros.errors import UserError
@@ -16,9 +15,8 @@ from xb_muscle_ros.fit.problem import Problem, moves_simulation, touches
 from xb_muscle_ros.fit.training import Training, step_of
 from xb_muscle_ros.models.composition import Composition
 from xb_muscle_ros.models.registry import compose
+from xb_muscle_ros.trials.trial import Array
 from xb_muscle_ros.work import Options, run
-
-Array = npt.NDArray[np.float64]
 
 # Of the correction's slopes, on the moved scale. Steps of 1 ms on a strain grid are halved where need be, and so err in
 # jumps of up to 3e-6 F0; the difference between the methods bends little, so that so large a step does it no harm.

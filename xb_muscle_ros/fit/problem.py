@@ -8,7 +8,6 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import naming
 from xb_muscle_ros.fit import features
@@ -22,8 +21,7 @@ from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.plain import fibre_from_plain, fibre_to_plain
 from xb_muscle_ros.simulation.offline import outputs
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 
 @dataclass(frozen=True)

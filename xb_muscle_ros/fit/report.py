@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import chi2
 
 from xb_muscle_ros import __version__
@@ -30,8 +29,7 @@ from xb_muscle_ros.models.fibre_writing import write_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.parameters import PARAMETERS
 from xb_muscle_ros.scores.rmsd import force_rmsd
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Of intervals by the curvature where no level was asked for.
 LEVEL = 0.95

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.coordinates import Coordinate
@@ -22,9 +21,8 @@ from xb_muscle_ros.fit.solve import Objective, Solution
 from xb_muscle_ros.fit.training import Training, finite_start
 from xb_muscle_ros.fit.uncertainty import Curvature, ProfileEnd, curvature, profile_side
 from xb_muscle_ros.progress import Progress
+from xb_muscle_ros.trials.trial import Array
 from xb_muscle_ros.work import Options, run, stream
-
-Array = npt.NDArray[np.float64]
 
 # Spread of further starts around the first, on the moved scale; of what is linear in its prior's standard deviations.
 _SPREAD, _LINEAR_SPREAD = 0.7, 0.5

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import scipy.optimize
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.noise import Scale
 from xb_muscle_ros.fit.training import Training
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # A point where the model has no solution counts as this far from the data, in F0 at every sample and in SD
 # at every feature.

@@ -20,8 +20,7 @@ from xb_muscle_ros.fit.ends import BOUND, UNSETTLED, of_parameters, profile_end
 from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.fit.noise import noise_at
 from xb_muscle_ros.fit.solve import Objective, Solution, descend
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Points on one side of a profile at most; the search converges on the root of the likelihood ratio in four or five.
 _POINTS = 9

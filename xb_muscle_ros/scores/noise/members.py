@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import lfilter, lfiltic
 
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Samples until drawn noise forgets how it began.
 _BURN_IN = 400

@@ -10,14 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.scores.noise.members import SILENCE, OrnsteinUhlenbeck
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0, Source, TrialNoise
 from xb_muscle_ros.scores.noise.posterior import share_of_others, spread_over
 from xb_muscle_ros.scores.noise.regressions import restricted
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Noise of real force at 1 kHz (rat soleus fibre 18Dec2017a, lag-1 correlation 0.95) decays within 20 ms; 50 times
 # longer or shorter is nothing special. Where steps are much shorter, a thousandth of white noise shows.

@@ -9,8 +9,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.scores.noise.model import MEMBERS
 from xb_muscle_ros.scores.noise.regressions import ORDER, Part, regressions, squares
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Partial correlations as inverse hyperbolic tangents: how far they go (0.995), and what to expect of force recordings
 # (rat soleus fibre 18Dec2017a at 1 kHz has lag-1 correlations of 0.91 to 0.98, and hum: noise that decays within 18 ms,

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtri
 
 from xb_muscle_ros.errors import UserError
@@ -19,9 +18,7 @@ from xb_muscle_ros.scores.noise.pieces import Piece, evenly_sampled, smooth_piec
 from xb_muscle_ros.scores.noise.regressions import Part
 from xb_muscle_ros.scores.noise.windows import LEAST, Window, isometric_window
 from xb_muscle_ros.scores.steady import steady_part
-from xb_muscle_ros.trials.trial import Trial
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array, Trial
 
 # Windows with fewer samples together tell less than smooth pieces do.
 ENOUGH = 60

@@ -7,12 +7,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.scores.steady import steady_part
-from xb_muscle_ros.trials.trial import Trial
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array, Trial
 
 # A window has at least this many samples; more than the most tell no more about noise, only about slow force.
 LEAST, MOST = 20, 1000
