@@ -180,8 +180,7 @@ def _places_of_conditions(table: SrsTable) -> tuple[tuple[int, int, int], ...]:
 
 def near(values: Array, level: float) -> npt.NDArray[np.bool_]:
     """Which values are one nominal value."""
-    found: npt.NDArray[np.bool_] = np.isclose(values, level, rtol=1e-3, atol=1e-6)
-    return found
+    return np.isclose(values, level, rtol=1e-3, atol=1e-6)
 
 
 def levels(values: Array) -> Array:

@@ -48,13 +48,11 @@ class Correction:
             KeyError: the trial has no correction; held-out ones have none.
         """
         slopes = self.force_slopes.get(name)
-        added: Array = self.force[name] if slopes is None else self.force[name] + slopes @ (z - self.at)
-        return added
+        return self.force[name] if slopes is None else self.force[name] + slopes @ (z - self.at)
 
     def of_features(self, z: Array) -> Array:
         """What to add to the distances of the training features at a point, in standard deviations."""
-        added: Array = self.features + (self.feature_slopes @ (z - self.at) if self.at.size else 0.0)
-        return added
+        return self.features + (self.feature_slopes @ (z - self.at) if self.at.size else 0.0)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -53,14 +53,12 @@ class FitTrial:
     def steady(self) -> npt.NDArray[np.bool_]:
         """Which of the force that counts is steady before the first change of length, shape (k,)."""
         begin, end = self.steady_s or (np.inf, -np.inf)
-        inside: npt.NDArray[np.bool_] = (self.force_time_s >= begin) & (self.force_time_s <= end)
-        return inside
+        return (self.force_time_s >= begin) & (self.force_time_s <= end)
 
     @property
     def dt_s(self) -> Array:
         """Time between samples in whole nanoseconds, as messages have it, shape (n - 1,)."""
-        steps: Array = np.diff(to_ns(self.time_s)) / 1e9
-        return steps
+        return np.diff(to_ns(self.time_s)) / 1e9
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""

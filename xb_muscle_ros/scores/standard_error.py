@@ -56,8 +56,7 @@ class ForceNoise:
             time_s: of the samples, shape (n,), s.
         """
         found = weights.T @ matmul_toeplitz(self.autocovariance(time_s), weights)
-        symmetric: Array = 0.5 * (found + found.T)
-        return symmetric
+        return 0.5 * (found + found.T)
 
     def of_sum(self, weights: Array, time_s: Array) -> float:
         """Standard error of one weighted sum of samples, weights of shape (n,)."""

@@ -30,8 +30,7 @@ def coloured_noise(
     """
     innovations = random.normal(size=n) * sd * np.sqrt(1.0 - autocorrelation**2)
     innovations[0] = random.normal() * sd
-    out: Array = lfilter([1.0], [1.0, -autocorrelation], innovations)
-    return out
+    return lfilter([1.0], [1.0, -autocorrelation], innovations)
 
 
 def made(

@@ -35,8 +35,7 @@ class Regression(NamedTuple):
             (factor.size, time_s.size + _BURN_IN)
         )
         # Along the last axis, where samples lie side by side: three times as fast.
-        out: Array = lfilter([1.0], np.concatenate([[1.0], -self.weights]), white, axis=-1)[:, _BURN_IN:]
-        return out
+        return lfilter([1.0], np.concatenate([[1.0], -self.weights]), white, axis=-1)[:, _BURN_IN:]
 
     def variance_of_mean(self, time_s: Array) -> float:
         """See `model.Member`."""
@@ -57,8 +56,7 @@ class Regression(NamedTuple):
         """See `model.Member`."""
         lags = lags_s / step_s
         gamma = self.autocovariance(int(np.ceil(lags[-1] - 1e-6)) + 1)
-        out: Array = np.interp(lags, np.arange(gamma.size), gamma)
-        return out
+        return np.interp(lags, np.arange(gamma.size), gamma)
 
     def times(self, factor: float) -> Regression:
         """See `model.Member`."""

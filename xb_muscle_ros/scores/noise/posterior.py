@@ -67,8 +67,7 @@ def possible(parts: Sequence[Part], shares: Sequence[float], z: Array, own: int)
     log = -_costs(parts, shares, np.clip(tried, -_REACH, _REACH)) + 0.5 * np.sum(normal**2, axis=1) / _WIDER**2
     weights = np.where(np.all(np.abs(tried) <= _REACH, axis=1), np.exp(log - log.max()), 0.0)
     found = regressions(np.clip(tried, -_REACH, _REACH))
-    possible: Array = tried[spread_over(np.sum(squares(parts[:own], found)[0], axis=1) * found.sizes[:, 0], weights)]
-    return possible
+    return tried[spread_over(np.sum(squares(parts[:own], found)[0], axis=1) * found.sizes[:, 0], weights)]
 
 
 def spread_over(sizes: Array, weights: Array) -> npt.NDArray[np.intp]:

@@ -55,8 +55,7 @@ class ResidualNoise(NamedTuple):
     @property
     def variance_f0(self) -> Array:
         """Of each trial, F0², shape (trials,)."""
-        out: Array = self.variances_f0 @ self.probability
-        return out
+        return self.variances_f0 @ self.probability
 
     def covariance_of_sums(self, trial: int, weights: Array) -> Array:
         """Covariance of weighted sums over a trial's samples of its noise, shape (sums, sums).
