@@ -179,9 +179,7 @@ def diagnose(
             are found by the fibre's name.
         model: parameter set of the fibre files; None: the one that the files name.
         method: how heads are distributed over strain; None: the files'.
-        reference_length: see `read_trials`; of bags only.
-        f0: see `read_trials`; of bags only.
-        trials_of: see `read_trials`; of bags only.
+        reference_length, f0, trials_of: see `read_trials`; of bags only.
         features: JSON table of measured SRS (F0/L0) and isometric force (F0) to be met beside the traces.
         predict: such a table that is predicted and compared, never fitted.
         nuisance: SDs of ordinary measurement errors where the study knows better, by name, such as

@@ -147,9 +147,7 @@ def evaluate(
         fibre: names, fibre files or `Fibre`, one or several; empty: the package's file of a trial's fibre.
         model: parameter sets, one or several; None: all that the fibre files have.
         method: how heads are distributed over strain; None: the files'.
-        reference_length: see `read_trials`; of bags only.
-        f0: see `read_trials`; of bags only.
-        trials_of: see `read_trials`; of bags only.
+        reference_length, f0, trials_of: see `read_trials`; of bags only.
         settle: isometric time before each trial, s; None: until at rest.
         measured_only: the recordings alone, without models.
         skip_bad: leave recordings that cannot be evaluated out, in place of refusing all.
