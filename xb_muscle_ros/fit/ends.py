@@ -21,11 +21,6 @@ _NEAR = 0.02
 _MATTERS = 0.9
 
 
-def closes(ended_by: str) -> bool:
-    """Whether an end is one of the likelihood."""
-    return ended_by == DATA
-
-
 def profile_end(
     objective: Objective, best: Solution, end: Solution, index: int, inflation: float, wanted: float
 ) -> str:

@@ -72,7 +72,7 @@ def force_noise(trial: Trial) -> ForceNoise | None:
     if trial.force_time_s.size < 2:
         return None
     name, step_s = trial.facts.trial, float(np.median(np.diff(trial.force_time_s)))
-    if evenly_sampled(trial):
+    if evenly_sampled(trial.force_time_s):
         window = isometric_window(trial)
         if window.force_f0.size >= LEAST:
             # In fewer samples a line is no sharper than an autoregression.

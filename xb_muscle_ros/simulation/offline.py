@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 
 import numpy as np
 
@@ -128,7 +128,3 @@ def one_for_all(lines: Sequence[str]) -> list[str]:
     """The first of the lines of `pushing`, and of how many more trials the same is true."""
     more = len(lines) - 1
     return [f"{lines[0]}; likewise in {more} more trial{'s' * (more > 1)}" if more else lines[0]] if lines else []
-
-
-Simulator = Callable[[Trial], Simulated]
-"""What replay compares with a recording: offline steps, or a node on the other side of DDS."""

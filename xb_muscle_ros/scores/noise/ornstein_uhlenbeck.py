@@ -102,17 +102,8 @@ class Part:
         self.log = whitened.log + of_drift
 
 
-def by_ornstein_uhlenbeck(parts: Mapping[str, Sequence[Part]], source: Source) -> dict[str, TrialNoise]:
-    """Noise of trials.
-
-    Args:
-        parts: of each, at least one.
-        source: what they are.
-    """
-    return {name: _of_trial(name, parts, source) for name in parts}
-
-
-def _of_trial(name: str, parts: Mapping[str, Sequence[Part]], source: Source) -> TrialNoise:
+def of_trial(name: str, parts: Mapping[str, Sequence[Part]], source: Source) -> TrialNoise:
+    """Noise of one of the trials whose parts are given, at least one of each."""
     own = [p for p in parts[name] if not p.silent]
     samples, freedom = (int(sum(p.samples for p in parts[name])), sum(p.freedom for p in own or parts[name]))
     if not own:

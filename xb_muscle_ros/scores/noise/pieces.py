@@ -45,12 +45,7 @@ class Piece(NamedTuple):
     drift: Array
 
 
-def evenly_sampled(trial: Trial) -> bool:
-    """Whether a trial's force has samples a step apart, jitter and gaps aside."""
-    return steps_evenly(trial.force_time_s)
-
-
-def steps_evenly(time_s: Array) -> bool:
+def evenly_sampled(time_s: Array) -> bool:
     """Whether samples are a step apart, jitter and gaps aside."""
     steps = np.diff(time_s)
     if not steps.size:

@@ -50,7 +50,7 @@ def noise_of(trials: Sequence[Trial]) -> NoiseModel:
     for trial in trials:
         if not np.all(np.isfinite(trial.force_n)):
             raise UserError(f"trial {trial.facts.trial}: force is not finite; leave the trial out")
-    even = {t.facts.trial: evenly_sampled(t) for t in trials}
+    even = {t.facts.trial: evenly_sampled(t.force_time_s) for t in trials}
     known = by_windows([isometric_window(t) for t in trials if even[t.facts.trial]])
     enough = sum(noise.samples for noise in known.values()) >= ENOUGH
     by_pieces = [t for t in trials if not (enough and even[t.facts.trial])]
@@ -121,7 +121,7 @@ def by_curves(pieces: Mapping[str, Sequence[Piece]], even: Mapping[str, bool]) -
     width = max((p.drift.shape[1] for n in fast for p in pieces[n]), default=0)
     parts = {n: [Part(_step_s(p.time_s), p.force_f0, p.drift, width) for p in pieces[n]] for n in pieces if n in fast}
     timed = {n: [ou.Part(*p) for p in of] for n, of in pieces.items() if of and n not in fast}
-    return by_regressions(parts, Source.CURVE) | ou.by_ornstein_uhlenbeck(timed, Source.CURVE)
+    return by_regressions(parts, Source.CURVE) | {n: ou.of_trial(n, timed, Source.CURVE) for n in timed}
 
 
 def _step_s(time_s: Array) -> float:
