@@ -16,6 +16,7 @@ from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.scores.redevelopment import redevelopment, restretch_end
 from xb_muscle_ros.scores.stiffness import short_range_stiffness
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
+from xb_muscle_ros.work.plain import from_plain
 
 FIBRES = ("13Dec2017a", "14Dec2017b", "18Dec2017a", "18Dec2017b", "19Dec2017a")
 
@@ -23,7 +24,7 @@ FIBRES = ("13Dec2017a", "14Dec2017b", "18Dec2017a", "18Dec2017b", "19Dec2017a")
 def simulated(model: str, fibres: tuple[str, ...] = FIBRES, settle_s: float | None = None) -> SrsTable:
     (models,) = gather(fibres, [model], None)
     tasks = grid.tasks([models], settle_s=settle_s)
-    cells = [grid.Cells.of_plain(grid.simulate(task)) for task in tasks]
+    cells = [from_plain(grid.Cells, grid.simulate(task)) for task in tasks]
     return grid.table(model, list(models.fibres.values()), tasks, cells)
 
 

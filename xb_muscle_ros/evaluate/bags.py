@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ from xb_muscle_ros.trials.bag_reading import TrialBag
 from xb_muscle_ros.trials.completing import CONDITIONING_FOUND, Known, pca_of
 from xb_muscle_ros.trials.study import left_out, trial_of_bag
 from xb_muscle_ros.trials.trial import Array, Trial
+from xb_muscle_ros.work.plain import to_plain
 
 Task = dict[str, Any]
 _LEAST_STRETCH_L0 = 0.01
@@ -50,7 +50,7 @@ def tasks(request: Request, bags: Sequence[Path], fibres: Mapping[str, Path] | N
         "method": request.method,
         "settle_s": request.settle_s,
         "measured_only": request.measured_only,
-        "known": asdict(request.known),
+        "known": to_plain(request.known),
         "trials_of": request.only,
     }
     # Workers may stand in another folder; messages name bags as the user did.
@@ -85,7 +85,7 @@ def evaluate_bag(task: Mapping[str, Any]) -> dict[str, Any]:
         text = str(error).replace(task["path"], task["bag"])
         problem = text if task["bag"] in text else f"bag {task['bag']}: {text}"
         found = Evaluated(label, problem=problem, unserved=error.fibre if isinstance(error, NoFibreFile) else "")
-    return asdict(found)
+    return to_plain(found)
 
 
 def _evaluated(task: Mapping[str, Any], label: str) -> Evaluated:

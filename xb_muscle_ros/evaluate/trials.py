@@ -6,7 +6,6 @@ import functools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -82,13 +81,6 @@ class Evaluated:
     missing: Sequence[str] = ()
     warnings: Sequence[str] = ()
     notes: Sequence[str] = ()
-
-    @classmethod
-    def of_plain(cls, row: Mapping[str, Any]) -> Evaluated:
-        """From plain data, as `evaluate_bag` gives it and JSON gives it back."""
-        facts = None if row["facts"] is None else Facts(**row["facts"])
-        scores = {of: {name: Estimate(*each) for name, each in held.items()} for of, held in row["scores"].items()}
-        return cls(**{**row, "facts": facts, "scores": scores})
 
 
 class Trials:

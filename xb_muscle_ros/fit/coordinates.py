@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -268,22 +267,3 @@ def fault_coordinates(
         groups = {Scope.TRIAL: trials, Scope.SOLUTION: solutions, Scope.STUDY: ("",)}[row.scope]
         found += [Coordinate(name, g, False, row.lower, row.upper, 0.0, 0.0, sd) for g in dict.fromkeys(groups)]
     return tuple(found)
-
-
-def to_json(coordinates: Sequence[Coordinate]) -> list[dict[str, Any]]:
-    """Plain data; a missing prior is null."""
-    return [{**c.__dict__, "prior_sd": None if math.isinf(c.prior_sd) else c.prior_sd} for c in coordinates]
-
-
-def from_json(rows: Sequence[Mapping[str, Any]]) -> tuple[Coordinate, ...]:
-    """Coordinates from plain data."""
-    return tuple(
-        Coordinate(
-            **{
-                **row,
-                "prior_sd": math.inf if row["prior_sd"] is None else row["prior_sd"],
-                "others": tuple(row["others"]),
-            }
-        )
-        for row in rows
-    )

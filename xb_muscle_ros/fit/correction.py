@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -52,26 +51,4 @@ class Correction:
 
     def of_features(self, z: Array) -> Array:
         """What to add to the distances of the training features at a point, in standard deviations."""
-        return self.features + (self.feature_slopes @ (z - self.at) if self.at.size else 0.0)
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain data."""
-        return {
-            "at": self.at.tolist(),
-            "force": {name: values.tolist() for name, values in self.force.items()},
-            "force_slopes": {name: values.tolist() for name, values in self.force_slopes.items()},
-            "features": self.features.tolist(),
-            "feature_slopes": self.feature_slopes.tolist(),
-        }
-
-    @staticmethod
-    def from_json(row: Mapping[str, Any]) -> Correction:
-        """A correction from plain data."""
-        at = np.array(row["at"], dtype=np.float64)
-        return Correction(
-            at=at,
-            force={name: np.array(values) for name, values in row["force"].items()},
-            force_slopes={name: np.array(values) for name, values in row["force_slopes"].items()},
-            features=np.array(row["features"], dtype=np.float64),
-            feature_slopes=np.array(row["feature_slopes"], dtype=np.float64).reshape(len(row["features"]), at.size),
-        )
+        return self.features + (self.feature_slopes @ (z - self.at) if self.feature_slopes.size else 0.0)

@@ -15,8 +15,7 @@ from xb_muscle_ros.scores.steady import steady_part
 from xb_muscle_ros.simulation.offline import calcium_per_step
 from xb_muscle_ros.trials.stamps import to_ns
 from xb_muscle_ros.trials.trial import Array, Trial
-
-_ARRAYS = ("time_s", "length_l0", "calcium_um", "force_time_s", "measured_f0")
+from xb_muscle_ros.work.plain import from_plain, to_plain
 
 
 @dataclass(frozen=True)
@@ -62,12 +61,12 @@ class FitTrial:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return {**self.__dict__, **{name: getattr(self, name).tolist() for name in _ARRAYS}}
+        return to_plain(self)
 
     @staticmethod
     def from_json(row: Mapping[str, Any]) -> FitTrial:
         """A trial from plain data."""
-        return FitTrial(**{**row, **{name: np.array(row[name], dtype=np.float64) for name in _ARRAYS}})
+        return from_plain(FitTrial, row)
 
 
 def fit_trials(

@@ -6,7 +6,6 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -167,13 +166,3 @@ def feature(kind: str, pca: float, recovery_s: float, amplitude_l0: float, value
     """A measured value with the standard deviation that its kind has."""
     sd = _FORCE_SD_F0 if kind == "isometric_force" else _SRS_SD + _SRS_SHARE * abs(value)
     return Feature(kind, pca, recovery_s, amplitude_l0, value, sd)
-
-
-def to_json(features: Sequence[Feature]) -> list[dict[str, Any]]:
-    """Plain data."""
-    return [dict(f.__dict__) for f in features]
-
-
-def from_json(rows: Sequence[Mapping[str, Any]]) -> tuple[Feature, ...]:
-    """Features from plain data."""
-    return tuple(Feature(**row) for row in rows)

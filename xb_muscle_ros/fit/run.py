@@ -11,7 +11,7 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.coordinates import Coordinate
-from xb_muscle_ros.fit.descents import solution_from_json, solution_to_json, start_task
+from xb_muscle_ros.fit.descents import start_task
 from xb_muscle_ros.fit.features import F0_ANCHOR
 from xb_muscle_ros.fit.methods import fast_form
 from xb_muscle_ros.fit.noise import FIRST, Scale
@@ -23,6 +23,7 @@ from xb_muscle_ros.fit.uncertainty import Curvature, ProfileEnd, curvature, prof
 from xb_muscle_ros.progress import Progress
 from xb_muscle_ros.trials.trial import Array
 from xb_muscle_ros.work import Options, run, stream
+from xb_muscle_ros.work.plain import from_plain, to_plain
 
 # Spread of further starts around the first, on the moved scale; of what is linear in its prior's standard deviations.
 _SPREAD, _LINEAR_SPREAD = 0.7, 0.5
@@ -128,8 +129,8 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
 def profile_task(task: Mapping[str, Any]) -> dict[str, Any]:
     """One side of one profile."""
     objective = Objective(Training(Problem.from_json(task["problem"])), Scale(*task["scale"]))
-    best, shape = solution_from_json(task["best"]), Curvature(*(np.array(row) for row in task["shape"]))
-    return profile_side(objective, best, task["index"], task["up"], shape, task["level"])._asdict()
+    best, shape = from_plain(Solution, task["best"]), from_plain(Curvature, task["shape"])
+    return to_plain(profile_side(objective, best, task["index"], task["up"], shape, task["level"]))
 
 
 def _starts(problem: Problem, settings: Settings) -> list[Array]:
@@ -163,7 +164,7 @@ def _descended(tasks: Sequence[Mapping[str, Any]], options: Options) -> tuple[li
         if "lost" in row:
             lost[index] = row["lost"]
             continue
-        found[index] = solution = solution_from_json(row)
+        found[index] = solution = from_plain(Solution, row)
         if solution.cost < best:
             best = solution.cost
             if not options.quiet:
@@ -179,10 +180,10 @@ def _profiles(
 ) -> tuple[dict[int, tuple[ProfileEnd, ProfileEnd]], Array | None]:
     """Both sides of every model parameter's profile, or a better point that one of them met."""
     chosen = [j for j, c in enumerate(problem.coordinates) if c.group is None]
-    task = {"problem": problem.to_json(), "best": solution_to_json(best), "scale": list(scale), "level": level}
-    task["shape"] = [row.tolist() for row in shape]
+    task = {"problem": problem.to_json(), "best": to_plain(best), "scale": list(scale), "level": level}
+    task["shape"] = to_plain(shape)
     tasks = [{**task, "index": j, "up": up} for j in chosen for up in (False, True)]
     rows = run(profile_task, tasks, replace(options, label="profiles"))
-    sides = [ProfileEnd(r["end"], r["ended_by"], [(x, y) for x, y in r["points"]], r["better"]) for r in rows]
+    sides = [from_plain(ProfileEnd, row) for row in rows]
     better = next((np.array(side.better) for side in sides if side.better is not None), None)
     return {j: (sides[2 * k], sides[2 * k + 1]) for k, j in enumerate(chosen)}, better
