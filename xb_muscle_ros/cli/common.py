@@ -129,7 +129,6 @@ def called(function: Callable[..., R], arguments: argparse.Namespace, *first: ob
 
     Args:
         function: one of the public ones.
-        arguments: parsed.
         first: its first arguments.
         more: its parameters that the command line has by other names, or not as they are; they go first.
     """

@@ -38,7 +38,6 @@ def tasks(request: Request, bags: Sequence[Path], fibres: Mapping[str, Path] | N
     """One task for each bag.
 
     Args:
-        request: what to do.
         bags: folders or ``.mcap`` files.
         fibres: fibre files by the fibre's name; None: a bag's fibre name selects the package's fibre file.
     """
@@ -58,12 +57,7 @@ def tasks(request: Request, bags: Sequence[Path], fibres: Mapping[str, Path] | N
 
 
 def tasks_of_fibres(task: Mapping[str, Any], fibres: Sequence[str]) -> tuple[list[Task], str | None]:
-    """Tasks for a bag of several fibres, one for each trial that is taken, and a line on those that are not.
-
-    Args:
-        task: of the bag.
-        fibres: in the bag.
-    """
+    """Tasks for a bag of several fibres, one for each trial that is taken, and a line on those that are not."""
     taken = list(fibres)
     if task["trials_of"] is not None:
         taken = [name for name in fibres if name == task["trials_of"]]

@@ -113,7 +113,6 @@ def table(label: str, fibres: Sequence[Fibre], made: Sequence[Task], results: Se
     """Results of one set's tasks as a table.
 
     Args:
-        label: of the table.
         fibres: in the order of the tasks.
         made, results: tasks of these fibres, and what `simulate` made of them.
     """

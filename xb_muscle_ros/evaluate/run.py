@@ -46,7 +46,6 @@ def evaluate(request: Request, tell: Callable[[str], None] = lambda line: None) 
     """Compute everything; nothing but the journal is written.
 
     Args:
-        request: what to do.
         tell: called with each line on a recording that cannot be used.
 
     Raises:

@@ -78,7 +78,6 @@ class SrsTable:
         """SRS of the unconditioned stretch at each pCa, and standard error (NaN where not known), shape (pca,), F0/L0.
 
         Args:
-            fibre: name.
             kind: one of `UNCONDITIONED`.
         """
         values, errors = np.full(self.pca.size, np.nan), np.full(self.pca.size, np.nan)

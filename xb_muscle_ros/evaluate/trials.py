@@ -186,9 +186,7 @@ def srs_table(trials: Trials, of: str, label: str) -> SrsTable | None:
     """SRS and isometric force of the trials of the paper's protocol; repeats of a condition are averaged.
 
     Args:
-        trials: all.
         of: parameter set, or `MEASURED`.
-        label: of the table.
 
     Returns:
         None where no trial has pCa, amplitude and recovery time.

@@ -48,8 +48,6 @@ def own_faults(problem: Problem, trial: FitTrial, known: bool = True) -> tuple[C
     """Faults that a problem has of every trial or solution, as coordinates of this trial.
 
     Args:
-        problem: of the fit.
-        trial: any.
         known: leave out those of which the problem has this trial's value, as a solution's that the fit met.
     """
     kinds = {
@@ -69,7 +67,6 @@ def calibrated_force(problem: Problem, z: Array, trial: FitTrial, known: bool = 
 
     Args:
         problem: of the fit; a correction is added where it has one, and must then have one for this trial.
-        z: fitted point.
         trial: one that the fit did not see; need not be of the problem.
         known: False estimates also what the fit knows of the trial's solution: for a point that was not fitted.
 

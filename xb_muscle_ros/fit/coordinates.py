@@ -92,7 +92,6 @@ def free_names(
     """Names of the parameters that are moved.
 
     Args:
-        fibre: its model.
         free: names to move; None: those that the paper fitted, and those of the model's mechanisms.
         fixed, ties: see `parameter_coordinates`.
     """
@@ -113,7 +112,6 @@ def parameter_coordinates(
     Args:
         fibre: start values, model and method.
         free: see `free_names`.
-        fixed: names not to move.
         ties: name -> name whose value it takes.
         choices: bounds and priors by name.
 

@@ -27,10 +27,8 @@ def profile_end(
     """What ends a profile at a point where the likelihood ratio reaches its limit.
 
     Args:
-        objective: of the fit.
         best: its best point.
         end: the best point with the coordinate held at the end of its interval.
-        index: of the coordinate.
         inflation: of its variance, see `uncertainty.Curvature`.
         wanted: limit of the root of the likelihood ratio.
     """
@@ -92,7 +90,6 @@ def quadratic_ends(
     """Both ends of each coordinate's interval by the curvature at the best point, and what ends them.
 
     Args:
-        coordinates: of the fit.
         z: its best point, on the moved scale.
         covariance, prior_share, weak: see `uncertainty.Curvature`.
         wanted: half width, in standard deviations.

@@ -66,7 +66,6 @@ def simulated(muscle: Muscle, features: Sequence[Feature], shifts: Mapping[float
     """What a fibre shows for each feature, shape (features,).
 
     Args:
-        muscle: the fibre.
         features: at any conditions; those of one pCa and amplitude share what went before.
         shifts: pCa shift of the solution by stated pCa.
 
@@ -111,7 +110,6 @@ def measured(
 
     Args:
         path: JSON with ``pCa``, ``recovery_s``, ``amplitude_L0``, ``fibres``: quantity -> [pCa][recovery][amplitude].
-        fibre: name of the fibre.
         stiffness: with SRS, or isometric force alone.
         tell: called with a line for each solution whose test stretches are left out.
 

@@ -31,7 +31,6 @@ def noise_at(training: Training, z: Array, slopes: tuple[Array, Array]) -> Resid
     """Noise behind the residuals at a point.
 
     Args:
-        training: the data.
         z: the point, on the moved scale.
         slopes: there, see `Training.slopes`.
     """

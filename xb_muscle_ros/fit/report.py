@@ -139,8 +139,6 @@ def as_json(fitted: Fitted, provenance: Mapping[str, Any], notes: Sequence[str] 
     """Everything, for ``fit.json``.
 
     Args:
-        fitted: the fit.
-        provenance: what it was given.
         notes: lines on what was taken for granted before it began.
     """
     rows = trial_rows(fitted)

@@ -85,8 +85,6 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
     own best point (see `rounds`), and profiles are those of the corrected Gaussian form.
 
     Args:
-        problem: trials and coordinates.
-        settings: starts, seed, level.
         options: where the work is done; finished starts and profiles are kept in the journal.
 
     Raises:

@@ -81,9 +81,7 @@ def descend(
     Trust-region least squares (SciPy's ``trf``) with slopes by differences.
 
     Args:
-        objective: what to make small.
         z: where to start; a coordinate that is held keeps its value.
-        held: index of the coordinate to hold.
         most: points to try at most.
         tolerance: relative change of the cost at which to stop.
     """

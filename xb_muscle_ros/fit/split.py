@@ -72,7 +72,6 @@ def held_out(
     """For each trial, whether it is kept out.
 
     Args:
-        trials: facts of the trials.
         hold_out: rules ``KEY=VALUE``; a trial that meets any is kept out.
         train: rules; where there are some, a trial that meets none is kept out.
         preset: ``paper`` or None.

@@ -81,16 +81,7 @@ class ProfileEnd(NamedTuple):
 def profile_side(
     objective: Objective, best: Solution, index: int, up: bool, shape: Curvature, level: float = 0.95
 ) -> ProfileEnd:
-    """Follow one coordinate from the best point, all others moving along, to where the likelihood ratio ends it.
-
-    Args:
-        objective: of the fit.
-        best: its best point.
-        index: of the coordinate.
-        up: upward or downward.
-        shape: see `curvature`.
-        level: of the interval.
-    """
+    """Follow one coordinate from the best point, all others moving along, to where the likelihood ratio ends it."""
     lower, upper = objective.training.problem.bounds
     bound = float(upper[index] if up else lower[index])
     wanted = float(np.sqrt(chi2.ppf(level, 1)))

@@ -31,8 +31,6 @@ def draw_replay(
     Args:
         path: of the first page, PNG; a PDF goes beside it. Further pages are called ``<name>_2`` and so on.
         trials: with or without measured force.
-        simulated: same order.
-        label: what the model's line is called.
         live: force that came from a node, drawn as dashes on top.
 
     Returns:

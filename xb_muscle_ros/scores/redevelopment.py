@@ -93,7 +93,6 @@ def redevelopment_rate(trial: Trial, time_s: Array, force_f0: Array, noise: Forc
     """k_tr (1/s) of a trial's force; no value, of which nothing is said, where it is not released and restretched.
 
     Args:
-        trial: lengths and calcium.
         time_s, force_f0, noise: see `redevelopment`.
     """
     restretched = restretch_end(trial.time_s, trial.length_change_l0)

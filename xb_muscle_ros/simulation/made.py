@@ -23,8 +23,6 @@ def coloured_noise(
     """First-order autoregressive noise.
 
     Args:
-        random: where it comes from.
-        n: samples.
         sd: standard deviation, F0.
         autocorrelation: correlation of one sample with the next, 0 up to below 1.
     """
@@ -44,9 +42,7 @@ def made(
     """A trial with measured force that a fibre and a faulty measurement made.
 
     Args:
-        muscle: the fibre.
         trial: what it is said to be given.
-        random: of the noise.
         noise_sd_f0: standard deviation of the noise, F0.
         substeps: steps of the fibre between two samples.
         faults: values by name of `measurement.artefacts.ARTEFACTS`.

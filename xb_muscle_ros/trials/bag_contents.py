@@ -61,7 +61,6 @@ def open_bag(path: Path, topics: Container[str] | None = None) -> BagContents:
     the order. Quality of service plays no part.
 
     Args:
-        path: the bag.
         topics: messages of these alone are kept; None for all.
 
     Raises:

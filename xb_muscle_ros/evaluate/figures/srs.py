@@ -87,7 +87,6 @@ def draw_srs(path: Path, data: SrsTable, tables: Mapping[str, SrsTable], section
     with the s.d. over fibres.
 
     Args:
-        path: of the PNG.
         data: measured SRS.
         tables: simulated SRS by model.
         section: ``srs`` of ``evaluate.json``.

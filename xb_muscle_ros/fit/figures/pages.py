@@ -37,8 +37,6 @@ def draw(folder: Path, fitted: Fitted, found: Mapping[str, Any]) -> list[Path]:
 
     Args:
         folder: where ``trials.png``, ``profiles.png`` and ``correlation.png`` go, each with a PDF beside it.
-        fitted: the fit.
-        found: of `fit.report.as_json`.
 
     Returns:
         paths of the PNG files.

@@ -30,15 +30,7 @@ _LONGEST_LABEL = 22
 
 
 def draw_profiles(path: Path, found: Mapping[str, Any]) -> Path:
-    """Draw a panel for each profiled parameter.
-
-    Args:
-        path: of the PNG; a PDF goes beside it.
-        found: of `fit.report.as_json`, with profiles.
-
-    Returns:
-        the path.
-    """
+    """Draw a panel for each profiled parameter into a PNG, and a PDF beside it; returns the path."""
     rows = [row for row in found["parameters"] if "profile" in row]
     columns = min(_COLUMNS, len(rows))
     lines = -(-len(rows) // columns)

@@ -21,12 +21,7 @@ _SAME_STEP = 1.2
 
 
 def by_regressions(parts: Mapping[str, Sequence[Part]], source: Source) -> dict[str, TrialNoise]:
-    """Noise of trials.
-
-    Args:
-        parts: of each, at least one.
-        source: what they are.
-    """
+    """Noise of trials, each of at least one part."""
     sounding = [p for own in parts.values() for p in own if not p.silent]
     if not sounding:
         return {name: _of_trial(name, parts, np.zeros(ORDER), source) for name in parts}

@@ -41,7 +41,6 @@ class Member(Protocol):
         Args:
             time_s: shape (n,), s.
             factor: how many times larger, shape (draws,).
-            random: where it comes from.
         """
 
     def variance_of_mean(self, time_s: Array) -> float:
@@ -89,8 +88,6 @@ class TrialNoise:
         Args:
             time_s: shape (n,), s.
             picked: which member, shape (draws,), each with a size that is drawn; None for the likeliest.
-            draws: how many.
-            random: where it comes from.
         """
         out = np.empty((draws, time_s.size))
         which = np.full(draws, -1) if picked is None else picked % len(self.members)
@@ -127,8 +124,6 @@ class NoiseModel:
 
         Args:
             times_s: of the samples of each trial, s.
-            draws: how many.
-            random: where it comes from.
             uncertain: draw size and autocorrelation as well, from what is not known of them.
 
         Returns:

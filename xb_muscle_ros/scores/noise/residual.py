@@ -61,7 +61,6 @@ class ResidualNoise(NamedTuple):
         """Covariance of weighted sums over a trial's samples of its noise, shape (sums, sums).
 
         Args:
-            trial: its place.
             weights: shape (samples, sums).
         """
         plain = weights.T @ weights

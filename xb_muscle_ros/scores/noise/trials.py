@@ -110,7 +110,6 @@ def by_curves(pieces: Mapping[str, Sequence[Piece]], even: Mapping[str, bool]) -
     Autoregressions where samples come evenly and fast enough for hum to be seen, else an Ornstein-Uhlenbeck process.
 
     Args:
-        pieces: of each trial.
         even: whether its force is sampled evenly.
     """
     fast = {

@@ -42,7 +42,6 @@ class Signal:
         """Make sure that the signal's numbers, converted, are within limits.
 
         Args:
-            where: the trial, for messages.
             values: shape (n,).
             limits: least and most.
             shown: how a message shows a value: a format with its unit.

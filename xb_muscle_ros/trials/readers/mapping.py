@@ -59,7 +59,6 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
 
     Args:
         tree: as a mapping file has it, without ``per_file`` and ``format``.
-        where: the mapping file, for messages.
         kind: `FILE` where signals are columns or channels, `BAG` where they are topics.
 
     Raises:

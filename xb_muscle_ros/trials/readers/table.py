@@ -145,7 +145,6 @@ def read_table(path: Path, decimal: str | None = None) -> Table:
     """Read delimited text: comma, semicolon or tab, told by the header line; lines that begin with # are comments.
 
     Args:
-        path: the file.
         decimal: `POINT` or `COMMA`; None for what the cells show.
 
     Raises:
