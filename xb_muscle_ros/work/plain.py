@@ -16,6 +16,7 @@ T = TypeVar("T")
 
 def to_plain(record: Any) -> dict[str, Any]:
     """A dataclass, named tuple or mapping by its fields, as Python's JSON can hold it: arrays become nested lists."""
+    fields: Mapping[str, Any]
     if dataclasses.is_dataclass(record):
         fields = {field.name: getattr(record, field.name) for field in dataclasses.fields(record) if field.init}
     else:
@@ -26,7 +27,7 @@ def to_plain(record: Any) -> dict[str, Any]:
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist()
-    if isinstance(value, Mapping) or _hints(type(value)) is not None:
+    if isinstance(value, Mapping) or _is_record(value):
         return to_plain(value)
     return [_plain(each) for each in value] if isinstance(value, (list, tuple)) else value
 
@@ -37,8 +38,8 @@ def from_plain(kind: type[T], row: Mapping[str, Any]) -> T:
     Fields may be of such kinds themselves, arrays of one dimension or of any where they are not empty, tuples,
     sequences and mappings of texts to these, each or None. A field that is of its kind already stays as it is.
     """
-    hints = _hints(kind) or {}
-    return kind(**{name: _made(hints[name], each) for name, each in row.items()})
+    made: T = _made(kind, row)
+    return made
 
 
 def _made(hint: Any, value: Any) -> Any:
@@ -55,11 +56,15 @@ def _made(hint: Any, value: Any) -> Any:
         return [_made(inner[0], each) for each in value]
     if origin in (dict, Mapping):
         return {key: _made(inner[1], each) for key, each in value.items()}
-    return value if _hints(hint) is None or isinstance(value, hint) else from_plain(hint, value)
+    if not _is_record(hint) or isinstance(value, hint):
+        return value
+    hints = _hints(hint)
+    return hint(**{name: _made(hints[name], each) for name, each in value.items()})
 
 
-@functools.cache
-def _hints(kind: Any) -> dict[str, Any] | None:
-    """Type hints of a record's fields; None for what is no record."""
-    is_record = dataclasses.is_dataclass(kind) or hasattr(kind, "_asdict")
-    return typing.get_type_hints(kind) if is_record else None
+def _is_record(value: Any) -> bool:
+    """Whether it is a dataclass or a named tuple, or an instance of one."""
+    return dataclasses.is_dataclass(value) or hasattr(value, "_asdict")
+
+
+_hints = functools.cache(typing.get_type_hints)
