@@ -10,7 +10,7 @@ import numpy as np
 from xb_muscle_ros.evaluate.srs_scores import READINGS, rows
 from xb_muscle_ros.evaluate.srs_table import SrsTable
 from xb_muscle_ros.evaluate.trials import MEASURED, WINDOWS, Trials
-from xb_muscle_ros.scores.activation import CLASSES
+from xb_muscle_ros.scores.conditions import CLASSES
 from xb_muscle_ros.scores.estimate import Estimate, quotient
 from xb_muscle_ros.scores.readout import ISOMETRIC, SRS_CONDITIONING, SRS_TEST, references, relative_srs
 from xb_muscle_ros.scores.redevelopment import K_TR

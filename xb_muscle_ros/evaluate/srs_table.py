@@ -13,8 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.scores.activation import activation_class
-from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0, CONDITIONS
+from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0, CONDITIONS, activation_class
 from xb_muscle_ros.scores.relative import Averaged, ByClass, by_class, nanmean, over_fibres
 from xb_muscle_ros.trials.trial import Array
 
