@@ -19,7 +19,6 @@ class Reported(NamedTuple):
 
     Attributes:
         quantity: key of what is computed in its place, see `computed`.
-        model: parameter set.
         lower, upper: what the paper gives: a value (equal), or a bound (the other is infinite).
         where: place in the paper.
     """

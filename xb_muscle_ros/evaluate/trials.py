@@ -62,7 +62,6 @@ class Evaluated:
         several: fibres of a bag that has more than one, where the task does not choose; then nothing else.
         problem: why it cannot be used, one line; then nothing else but `unserved`.
         unserved: the fibre that no fibre file serves.
-        facts: of the trial.
         scores: what `MEASURED` force and each model show, by quantity: ``rmsd_whole``, ``rmsd_conditioning`` and
             ``rmsd_test`` (F0), the keys of `scores.readout.TEXT` (F0/L0, F0) and ``k_tr`` (1/s).
         pushes: models that push where a muscle would be slack, and a line on each.

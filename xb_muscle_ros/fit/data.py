@@ -23,7 +23,6 @@ class FitTrial:
     """One trial, ready to be simulated and compared.
 
     Attributes:
-        name: of the trial.
         solution: of the bathing solution; trials of one share its faults.
         order: how many trials of the fibre came before it.
         held_out: whether it is kept out of the fit.

@@ -25,7 +25,6 @@ class Feature:
         kind: of `KINDS`; isometric force in F0, stiffness of a stretch in F0/L0.
         pca: -log10 of free calcium in M.
         recovery_s, amplitude_l0: of the conditioning before a test stretch, s and L0; of no account for other kinds.
-        value: measured.
         sd: its standard deviation, with what the model cannot be expected to meet.
         held_out: whether it is kept out of the fit.
     """

@@ -51,8 +51,6 @@ class Fitted:
     """What a fit found.
 
     Attributes:
-        problem: what was asked.
-        settings: how.
         best: the best point; its cost is in the units of `scale`.
         scale: of the differences that the fit left.
         starts: every descent, in order; None where the model had no solution at its start.

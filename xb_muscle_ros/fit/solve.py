@@ -41,7 +41,6 @@ class Objective:
     """Squared differences between model and training data, in standard deviations, and the prior's.
 
     Attributes:
-        training: the data.
         scale: how large a difference is one standard deviation.
     """
 

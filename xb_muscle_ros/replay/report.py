@@ -38,7 +38,6 @@ class Record:
     """One trial.
 
     Attributes:
-        trial: its name.
         fibre, model, method: what it was simulated with.
         pca, amplitude_l0, recovery_s: condition; None where not known.
         rmsd_f0: of the force by window, F0; None where the trial lacks it.

@@ -63,8 +63,6 @@ class TrialNoise:
     """Noise of one trial.
 
     Attributes:
-        trial: name.
-        source: from what it was taken.
         samples: of force that told of it.
         sd_f0: standard deviation, F0.
         freedom: degrees of freedom with which the size is known, given the autocorrelation.

@@ -38,7 +38,6 @@ class Whitened:
     """Samples and regressors, whitened for noise of variance 1 at every point of a grid.
 
     Attributes:
-        samples: how many.
         products: of whitened columns with each other, the samples' first, shape (points, 1 + columns, 1 + columns).
         log: log-determinant of the noise's covariance, shape (points,).
     """
@@ -81,7 +80,6 @@ class Part:
 
     Attributes:
         silent: whether there is nothing left beside the drift.
-        samples: how many.
         freedom: samples less what the drift takes.
         squares: sum of squares of whitened force beside whitened drift, F0², shape (points,).
         log: log-determinants, shape (points,).

@@ -23,7 +23,6 @@ class Part:
     Attributes:
         step_s: between samples, s.
         silent: whether there is nothing left beside the drift.
-        samples: how many.
         freedom: samples less what the drift takes.
         empty: ones on the diagonal for columns of drift that there are not, shape (width, width).
         begin: first samples of force and drift, shape (1 + width, order).

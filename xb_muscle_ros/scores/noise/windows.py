@@ -21,7 +21,6 @@ class Window(NamedTuple):
     """Force while the muscle only holds.
 
     Attributes:
-        trial: name.
         step_s: between samples, s.
         force_f0: shape (n,), evenly sampled, F0; empty where the trial has no such time.
     """

@@ -111,7 +111,6 @@ class Draft:
     """A trial in the making.
 
     Attributes:
-        recording, mapping: what it is made of.
         notes: what was done to the data, in words, for the trial's ``source``.
         warnings: what is unusual, one line each.
     """

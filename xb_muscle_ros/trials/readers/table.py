@@ -73,7 +73,6 @@ class Table:
     """A table as text: ``header`` names the columns, ``rows`` pairs line numbers (from 1) with cells.
 
     Attributes:
-        path: the file.
         header: names of the columns, none twice.
         rows: line number and cells of each row.
         decimal: `POINT` or `COMMA`.
