@@ -12,8 +12,6 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.units import KINDS, UNITS
 
 if TYPE_CHECKING:
-    from xb_muscle_ros.progress import Progress
-    from xb_muscle_ros.trials.importing import Imported
     from xb_muscle_ros.trials.readers.settings import ImportSettings
     from xb_muscle_ros.trials.trial import Trial
 
@@ -106,7 +104,9 @@ def run(args: argparse.Namespace) -> int:
                 progress.write(f"{event.bag}: kept, made of the same file with the same mapping")
             else:
                 imported += 1
-                _tell(event, progress)
+                progress.write(_line(event.bag, event.trial))
+                for warning in event.trial.warnings:
+                    progress.write(f"  warning: {warning}")
     print(f"{imported} imported, {kept} kept, {failed} left out")
     return 0 if not failed else 1 if imported + kept else 2
 
@@ -128,12 +128,6 @@ def _settings(args: argparse.Namespace) -> ImportSettings:
             branch = branch.setdefault(part, {})
         branch[name] = value
     return ImportSettings(tree, where, args.format, args.isometric_scaling, overrides)
-
-
-def _tell(event: Imported, progress: Progress) -> None:
-    progress.write(_line(event.bag, event.trial))
-    for warning in event.trial.warnings:
-        progress.write(f"  warning: {warning}")
 
 
 def _line(bag: Path, trial: Trial) -> str:

@@ -132,14 +132,26 @@ class SrsTable:
             force = np.array([np.nan if i is None else theirs[i] for i in places])
         return activation_class(force)
 
+    @functools.lru_cache(maxsize=256)  # noqa: B019 - a run has a few tables, and all of them to its end
     def pooled(self, kind: str, by: SrsTable | None = None) -> dict[str, ByClass]:
         """Each fibre by activation class, shape (classes, recovery, amplitude); see `relative`."""
-        return _pooled(self, kind, by)
+        found = {}
+        for name, fibre in self.fibres.items():
+            below, below_se = self.unconditioned(name, kind)
+            test = np.where(self.sound(name, kind), fibre.test, np.nan)
+            found[name] = by_class(test, below, self.classes(name, by), fibre.test_se, below_se)
+        return found
+
+    @functools.cached_property
+    def _places_of_conditions(self) -> tuple[tuple[int, int, int], ...]:
+        """Condition, recovery and amplitude index of the conditions that the axes have."""
+        places = [(place(self.recovery_s, c.recovery_s), place(self.amplitude_l0, c.amplitude_l0)) for c in CONDITIONS]
+        return tuple((k, i, j) for k, (i, j) in enumerate(places) if i is not None and j is not None)
 
     def at_conditions(self, values: Array) -> Array:
         """Of values of shape (..., recovery, amplitude) those at the `CONDITIONS`; NaN where not held."""
         picked = np.full((*values.shape[:-2], len(CONDITIONS)), np.nan)
-        for k, i, j in _places_of_conditions(self):
+        for k, i, j in self._places_of_conditions:
             picked[..., k] = values[..., i, j]
         return picked
 
@@ -157,23 +169,6 @@ class SrsTable:
         """The same with these fibres alone, as far as there are."""
         kept = {name: fibre for name, fibre in self.fibres.items() if name in fibres}
         return SrsTable(self.label, self.pca, self.recovery_s, self.amplitude_l0, kept)
-
-
-@functools.lru_cache(maxsize=256)
-def _pooled(table: SrsTable, kind: str, by: SrsTable | None) -> dict[str, ByClass]:
-    found = {}
-    for name, fibre in table.fibres.items():
-        below, below_se = table.unconditioned(name, kind)
-        test = np.where(table.sound(name, kind), fibre.test, np.nan)
-        found[name] = by_class(test, below, table.classes(name, by), fibre.test_se, below_se)
-    return found
-
-
-@functools.lru_cache(maxsize=256)
-def _places_of_conditions(table: SrsTable) -> tuple[tuple[int, int, int], ...]:
-    """Condition, recovery and amplitude index of the conditions that a table's axes have."""
-    places = [(place(table.recovery_s, c.recovery_s), place(table.amplitude_l0, c.amplitude_l0)) for c in CONDITIONS]
-    return tuple((k, i, j) for k, (i, j) in enumerate(places) if i is not None and j is not None)
 
 
 def near(values: Array, level: float) -> npt.NDArray[np.bool_]:
