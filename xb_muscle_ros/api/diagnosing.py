@@ -186,10 +186,7 @@ def diagnose(
             ``{"time_shift": 0.002}`` (s).
         quick: look less hard: minutes become tens of seconds.
         seed: of the bootstrap.
-        processes: of this machine; None: one per core, 0: this process.
-        scheduler: address of a Dask scheduler whose workers do the work.
-        journal: file that keeps finished work, so that an interrupted diagnosis goes on where it was.
-        progress: show progress on stderr.
+        processes, scheduler, journal, progress: see `fit`.
         tell: hears each warning; None: a `DataWarning` each.
 
     Returns:

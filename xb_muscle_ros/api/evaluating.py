@@ -145,11 +145,9 @@ def evaluate(
         skip_bad: leave recordings that cannot be evaluated out, in place of refusing all.
         empirical: JSON table of measured SRS; asks for the paper's grid of conditions.
         golden: JSON table of the authors' output, to be compared.
-        processes: of this machine; None: one per core, 0: this process.
-        scheduler: address of a Dask scheduler whose workers do the work.
+        processes, scheduler, progress: see `fit`.
         out: folder that keeps finished work, so that an interrupted evaluation goes on where it was; None: nothing is
             kept.
-        progress: show progress on stderr.
         tell: hears each line on what was left out or taken for granted; None: a `DataWarning` each.
 
     Returns:
