@@ -15,6 +15,7 @@ from xb_muscle_ros.models.strain_bins import wide_bins_line
 from xb_muscle_ros.trials.bag_files import plain
 from xb_muscle_ros.trials.bag_writing import write_trial
 from xb_muscle_ros.trials.completing import Known
+from xb_muscle_ros.trials.readers.description import FIRST_ISOMETRIC
 from xb_muscle_ros.trials.readers.units import quantity
 from xb_muscle_ros.trials.study import alike, read_study
 from xb_muscle_ros.trials.trial import Trial
@@ -28,7 +29,6 @@ FibreLike: TypeAlias = str | Path | Fibre
 PathOrTrial: TypeAlias = str | Path | Trial
 TrialsLike: TypeAlias = Union[PathOrTrial, Sequence[PathOrTrial], "SimulationResult"]
 """Bags or folders of bags, trials in memory, or what `simulate` returned."""
-FIRST_ISOMETRIC = "first_isometric"
 
 
 def fibre_of(

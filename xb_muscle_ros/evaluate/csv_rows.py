@@ -51,7 +51,7 @@ def trial_rows(trials: Trials) -> Iterator[Row]:
             if at is not None:
                 below = trials.found[usable[at][0]].scores.get(of, {}).get(SRS_TEST, Estimate(None))
                 test = found.get(SRS_TEST, Estimate(None))
-                found[_RELATIVE] = relative_srs(test._replace(why=""), below._replace(why=""), usable[at][0] == index)
+                found[_RELATIVE] = relative_srs(test, below, usable[at][0] == index)
             why = [f"{name}: {each.why}" for name, each in found.items() if each.why and name != _RELATIVE]
             relative = found.get(_RELATIVE, Estimate(None))
             if relative.value is None and relative.why:
