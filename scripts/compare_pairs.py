@@ -83,7 +83,7 @@ def main(given: argparse.Namespace) -> None:
     explorer = study.explorer
     alone = singles(explorer)
     both = pairs(explorer, alone)
-    heldout = HeldOut(explorer, study.recorded, effort.folds, explorer.options)
+    heldout = HeldOut(explorer, study.recorded)
     best = sorted(both, key=explorer.evidence, reverse=True)[: given.predicted]
     heldout.predict([(), *alone, *best])
     write_text(given.out, table(explorer, heldout, [(), *alone, *both]))

@@ -12,7 +12,7 @@ from xb_muscle_ros.diagnose.component import NAMED, Component, HeldOutGain
 from xb_muscle_ros.diagnose.residual import AnswerResidual, Place, ResidualLaw, ResidualMap
 
 FORMAT = 3
-"""Version of `diagnosis.json`; `report.older_formats` has the keys of former ones."""
+"""Version of `diagnosis.json`; `report.codec` has the keys of former ones."""
 
 
 class Verdict(str, enum.Enum):

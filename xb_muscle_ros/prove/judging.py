@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from xb_muscle_ros.diagnose.names import FAMILY, Name
 from xb_muscle_ros.diagnose.result import Verdict
@@ -73,16 +73,9 @@ class JudgedSingle(Judged):
     confidence: float | None
 
 
-class JudgedEffect(NamedTuple):
-    """What became of a mechanism that is concealed.
-
-    Attributes:
-        label: its name.
-        family: its family.
-        size_f0: its unique contribution, F0.
-        family_found: a name of its family is in the answer.
-        exact_found: its name is.
-    """
+@dataclass(frozen=True)
+class JudgedEffect:
+    """What became of a mechanism that is concealed: of its unique contribution, F0, and whether the answer has it."""
 
     label: str
     family: str
@@ -91,14 +84,9 @@ class JudgedEffect(NamedTuple):
     exact_found: bool
 
 
-class JudgedName(NamedTuple):
-    """A name that was given, or a component with its probability.
-
-    Attributes:
-        name, family, single, probability: as stated, see `Statement`.
-        family_right: an effect of this family is there.
-        exact_right: the effect itself is.
-    """
+@dataclass(frozen=True)
+class JudgedName:
+    """A name or a component as stated (see `Statement`), and whether an effect of its family, and itself, is there."""
 
     name: str
     family: str
@@ -113,14 +101,10 @@ class JudgedComposite(Judged):
     """What became of a composite.
 
     Attributes:
-        trials: of its study.
-        effects: mechanisms that are concealed.
-        outside: effects without a name that are.
-        artefacts: of the measurement.
-        named: mechanisms of the answer.
-        artefacts_named: artefacts that the tool names.
-        statements: all mechanisms that it gives a probability.
-        artefact_statements: all such artefacts.
+        trials: how many its study has.
+        effects, outside, artefacts: what is concealed: mechanisms, effects without a name, errors of the measurement.
+        named, artefacts_named: mechanisms of the answer, and artefacts that the tool names.
+        statements, artefact_statements: all of either that it gives a probability.
     """
 
     trials: int

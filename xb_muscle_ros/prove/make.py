@@ -24,13 +24,13 @@ from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.work import JsonValue, Options, stream
 
 _STUDIES = "Studies of made fibres, each with its bags and a fibre file that was fitted to another fibre"
-_SEALED = "The key was sealed when the cases were made: its SHA-256 is below."
+SEALED = "The key was sealed when the cases were made: its SHA-256 is below."
 _ABOUT = {
     SINGLES: f"{_STUDIES}. In some something is concealed: a mechanism, an effect that has no name, or a measurement "
-    f"artefact; in some nothing. {_SEALED}",
+    f"artefact; in some nothing. {SEALED}",
     COMPOSITES: f"{_STUDIES}, all recorded with ordinary measurement artefacts. In most something is concealed: one "
     "mechanism or several, an effect that has no name, or measurement artefacts beyond the ordinary; in some "
-    f"nothing. {_SEALED}",
+    f"nothing. {SEALED}",
 }
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.names import FAMILY, MECHANISMS, Name
 from xb_muscle_ros.diagnose.result import Verdict
@@ -15,8 +14,7 @@ from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure, save
 from xb_muscle_ros.prove.answers import FAMILIES_OF_PHYSICS
 from xb_muscle_ros.prove.counting import LARGE_F0
 from xb_muscle_ros.prove.judging import JudgedComposite, JudgedSingle
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 _FAMILIES = list(dict.fromkeys(FAMILY.values()))
 # Families side by side, artefacts behind.

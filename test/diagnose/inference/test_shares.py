@@ -44,6 +44,5 @@ def test_each_fibre_has_its_own_shares() -> None:
     rows = {(): (1.1e-5, 1.1e-5), (DRAG,): (1e-6, 1.1e-5)}
     e = explorer({n: [fit(n, 0.0, mean_square_f0=v) for v in values] for n, values in rows.items()}, 2)
     noise = (1e-3, 1e-3)
-    assert [explained(e, (DRAG,), noise, i) for i in range(2)] == pytest.approx([1.0, 0.0])
     assert explained(e, (DRAG,), noise) == pytest.approx(0.5)
     assert unique(e, (DRAG,), (), noise, 0) == pytest.approx(1.0)

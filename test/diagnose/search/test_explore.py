@@ -11,11 +11,12 @@ import pytest
 from by_hand import COUNT, DRAG, LATTICE, NOISE_F0, SHIFT, TITIN, explorer, fit, with_odds
 from made_trials import given_fibre
 
+from xb_muscle_ros.diagnose.effort import Effort
 from xb_muscle_ros.diagnose.inference.population import adjustment
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search import compiling, explore
 from xb_muscle_ros.diagnose.search.descent import Fit, fit_task
-from xb_muscle_ros.diagnose.search.explore import FORM, Effort, Explorer
+from xb_muscle_ros.diagnose.search.explore import FORM, Explorer
 from xb_muscle_ros.diagnose.search.promise import Promise
 from xb_muscle_ros.diagnose.search.system import Names, System, ordered
 from xb_muscle_ros.errors import UserError

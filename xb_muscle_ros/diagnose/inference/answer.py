@@ -24,7 +24,7 @@ from xb_muscle_ros.diagnose.inference.shares import unique
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.diagnose.search.explore import Explorer
-from xb_muscle_ros.diagnose.search.system import Names, ordered
+from xb_muscle_ros.diagnose.search.system import Names, at_bound, ordered
 from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS as ARTEFACTS_BY_NAME
 from xb_muscle_ros.measurement.artefacts import ORDINARY
@@ -32,8 +32,6 @@ from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.parameters import PARAMETERS
 
 _NORMAL = 1.959964
-# A value this near a bound, as a share of the way between bounds, ended there.
-_AT_BOUND = 1e-3
 
 
 @dataclass(frozen=True)
@@ -169,7 +167,7 @@ def _of_one(judged: Judged, names: Names, name: Name, i: int) -> tuple[Parameter
     for c in problem.coordinates:
         if c.name in wanted:
             value, z = fit.values[c.label], c.inward(fit.values[c.label])
-            rows.append(Parameter(c.label, _unit(c), value, _interval(c, z, fit.sds[c.label]), _at_bound(c, z)))
+            rows.append(Parameter(c.label, _unit(c), value, _interval(c, z, fit.sds[c.label]), at_bound(c, z)))
     return tuple(rows)
 
 
@@ -202,11 +200,6 @@ def _interval(c: Coordinate, z: float, sd: float) -> tuple[float, float]:
 
 def _unit(c: Coordinate) -> str:
     return ARTEFACTS_BY_NAME[c.name].unit if c.group is not None else PARAMETERS[c.name].unit
-
-
-def _at_bound(c: Coordinate, z: float) -> bool:
-    low, high = c.inward(c.lower), c.inward(c.upper)
-    return not _AT_BOUND * (high - low) < z - low < (1.0 - _AT_BOUND) * (high - low)
 
 
 def answer_of(found: Sequence[Component]) -> tuple[str, ...]:

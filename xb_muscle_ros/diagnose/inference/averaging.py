@@ -13,8 +13,7 @@ from xb_muscle_ros.diagnose.answers import FAMILY, NAMES
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import Names, without
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # What one more name costs that was not fitted, in the place of its occam factor.
 _UNFITTED = 1.5

@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.component import HeldOutGain
 from xb_muscle_ros.diagnose.names import Name
@@ -23,9 +22,9 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.calibration import calibrated_force
 from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.data import FitTrial
-from xb_muscle_ros.work import Options, run
+from xb_muscle_ros.trials.trial import Array
+from xb_muscle_ros.work import run
 
-Array = npt.NDArray[np.float64]
 Trials = Mapping[tuple[int, str], Array]
 """Force by fibre (its place in the study) and trial, F0."""
 
@@ -87,9 +86,9 @@ class HeldOut:
         folds: of each fibre, which are left out in turn; empty where nothing can be.
     """
 
-    def __init__(self, explorer: Explorer, recorded: Sequence[System], most: int, options: Options) -> None:
-        self.explorer, self.recorded, self.options = explorer, list(recorded), options
-        self.folds = [folds_of(system.trials, most) for system in recorded]
+    def __init__(self, explorer: Explorer, recorded: Sequence[System]) -> None:
+        self.explorer, self.recorded = explorer, list(recorded)
+        self.folds = [folds_of(system.trials, explorer.effort.folds) for system in recorded]
         self._found: dict[Names, dict[tuple[int, str], Array]] = {}
 
     def __bool__(self) -> bool:
@@ -117,7 +116,7 @@ class HeldOut:
                     }
                     tasks.append(task)
                     places.append((names, i, [t.name for t in trials]))
-        rows = run(predict_task, tasks, replace(self.options, label="held out")) if tasks else []
+        rows = run(predict_task, tasks, replace(self.explorer.options, label="held out")) if tasks else []
         for (names, i, held), row in zip(places, rows, strict=True):
             found = self._found.setdefault(names, {})
             for k, name in enumerate(held):

@@ -10,9 +10,9 @@ from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import Names
 
 
-def explained(explorer: Explorer, names: Names, noise_f0: Sequence[float], fibre: int | None = None) -> float:
+def explained(explorer: Explorer, names: Names, noise_f0: Sequence[float]) -> float:
     """Share of the base's mean square beyond noise that a set takes away; between 0 and 1."""
-    chosen = range(len(explorer.systems)) if fibre is None else [fibre]
+    chosen = range(len(explorer.systems))
     before = _excess(explorer, (), noise_f0, chosen)
     return float(np.clip(1.0 - _excess(explorer, names, noise_f0, chosen) / before, 0.0, 1.0)) if before > 0.0 else 0.0
 

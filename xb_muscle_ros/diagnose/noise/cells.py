@@ -9,9 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.trial import Phase
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array, Phase
 
 # What length changes leave behind passes fast at first, s; pauses longer than twice this are cut there.
 EARLY_S = 0.1

@@ -18,8 +18,7 @@ from xb_muscle_ros.diagnose.noise.cells import Residual
 from xb_muscle_ros.diagnose.noise.law import exponential_basis, scales
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.linear_fit import LinearFit
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 _TAU_S = np.geomspace(0.002, 5.0, 8)
 # Against the mean square of a column before the fit took its part.
@@ -33,14 +32,10 @@ class Discrepancy(NamedTuple):
 
     Attributes:
         predicted_f0: predicted residual of each held-out trial, in their order, F0.
-        scalings: what its terms scale with; empty where nothing is predicted.
-        ridge: how strongly weights are held to 0.
         explained: share of the training residual's mean square that was predicted of trials left out.
     """
 
     predicted_f0: tuple[Array, ...]
-    scalings: tuple[str, ...]
-    ridge: float
     explained: float
 
 
@@ -111,11 +106,11 @@ def _chosen(
         if total[k] > max(best[0], _LEAST_SHARE * silent.sum()) and not _luck(gain[k], silent):
             best = (float(total[k]), tuple(chosen), float(_RIDGES[k]))
     if not best[1]:
-        return Discrepancy(tuple(np.zeros(part.stop - part.start) for part in held), (), 0.0, 0.0)
+        return Discrepancy(tuple(np.zeros(part.stop - part.start) for part in held), 0.0)
     which = np.flatnonzero(np.isin(owner, best[1]))
     weights = _ridge(gram.sum(axis=0)[which][:, which], across.sum(axis=0)[which], best[2] * samples.sum())
     predicted = tuple(columns[part][:, which] @ weights for part in held)
-    return Discrepancy(predicted, best[1], best[2], best[0] / float(silent.sum()))
+    return Discrepancy(predicted, best[0] / float(silent.sum()))
 
 
 def _luck(gain: Array, silent: Array) -> bool:

@@ -20,8 +20,7 @@ from xb_muscle_ros.diagnose.search.system import Names, System, ordered
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.training import Training
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Longest move of a step: of a logarithm, and of others in units of their prior's standard deviation.
 _LONGEST_LOG, _LONGEST_SD = 1.0, 3.0

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.answers import NAMES
+from xb_muscle_ros.diagnose.effort import Effort
 from xb_muscle_ros.diagnose.inference.population import Estimate, adjustment
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search.descent import Fit, fit_task
@@ -18,8 +18,6 @@ from xb_muscle_ros.diagnose.search.whole import beside, together
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.work import Options, run
-
-Array = npt.NDArray[np.float64]
 
 # Chance, before anything is seen, that a mechanism is part of the truth, or an artefact beyond the ordinary.
 _PRIOR_ODDS = {True: np.log(0.1), False: np.log(0.05)}
@@ -31,28 +29,6 @@ _PATIENCE = 3.0
 FORM = 0.12
 # Of a set whose curvature is not known.
 _NONE = -1e9
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How hard to look.
-
-    Attributes:
-        steps: names in a set at most.
-        candidates: fitted at each step, the most promising first.
-        rivals: fitted in the place of each name of the best set.
-        most: Jacobians of a fit.
-        tolerance: fall of the cost at which a fit stops.
-    """
-
-    steps: int = 6
-    candidates: int = 6
-    rivals: int = 4
-    most: int = 10
-    tolerance: float = 0.02
-
-
-QUICK: Effort = Effort(steps=5, candidates=4, rivals=2, most=5, tolerance=0.1)
 
 
 def spread(system: System) -> list[dict[str, float]]:

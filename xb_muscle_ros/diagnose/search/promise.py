@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.answers import MECHANISMS
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
@@ -16,8 +15,7 @@ from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.measurement.artefacts import ORDINARY
 from xb_muscle_ros.models.catalogue import CATALOGUE
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # A mechanism's line is followed this far either way, in units of its start, where the fit begins.
 _LEAST_SHARE, _MOST_SHARE = 0.1, 8.0

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.answers import NAMES
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
@@ -22,14 +21,17 @@ from xb_muscle_ros.measurement.artefacts import ARTEFACTS, ORDINARY
 from xb_muscle_ros.mechanisms import Entry
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.parameters import PARAMETERS
+from xb_muscle_ros.trials.trial import Array
 
-Array = npt.NDArray[np.float64]
 Names = tuple[Name, ...]
 
 SATURATING = f"pCa {F0_ANCHOR.pca:g}"
 """Solution whose isometric force is F0."""
 # Residuals that count as independent resemble each other still: a misfit lasts as long as its phase.
 INDEPENDENT = 0.6
+# A value this near a bound, as a share of the way between bounds, ended there.
+_AT_BOUND = 1e-3
 BEYOND = 6.0
 """An artefact that is named may be so much larger than an ordinary one."""
 
@@ -170,10 +172,14 @@ class System:
         )
 
 
+def at_bound(c: Coordinate, z: float) -> bool:
+    """Whether a coordinate's value on the moved scale ended at a bound."""
+    low, high = c.inward(c.lower), c.inward(c.upper)
+    return not _AT_BOUND * (high - low) < z - low < (1.0 - _AT_BOUND) * (high - low)
+
+
 def _usual(parameter: str) -> float:
     """Value of a parameter that switches a block on."""
-    from xb_muscle_ros.models.parameters import PARAMETERS
-
     default = PARAMETERS[parameter].default
     assert default is not None
     return float(default)

@@ -8,14 +8,12 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import lfilter
 
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.prove.generator.study import Planned
 from xb_muscle_ros.prove.generator.world import SAMPLE_S, Stimulus
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 
 @dataclass(frozen=True)
@@ -78,41 +76,29 @@ class Size(NamedTuple):
     most: float
 
 
-PRIORS: Mapping[str, Size] = MappingProxyType(
-    {
-        Name.PCA_SHIFT.value: Size(0.05, 1.2, 3.0),
-        Name.RUN_DOWN.value: Size(0.01, 1.5, 5.0),
-        Name.FORCE_OFFSET.value: Size(0.005, 2.0, 6.0),
-        Name.FORCE_DRIFT.value: Size(0.002, 3.0, 12.0),
-        Name.LENGTH_GAIN.value: Size(0.02, 2.0, 6.0),
-        Name.TIME_SHIFT.value: Size(5e-4, 2.0, 8.0),
-        Name.TRANSDUCER_LAG.value: Size(5e-4, 2.0, 8.0),
-    }
-)
+_SIZES = {
+    Name.PCA_SHIFT.value: (Size(0.05, 1.2, 3.0), Size(0.04, 3.0, 6.0)),
+    Name.RUN_DOWN.value: (Size(0.01, 1.5, 5.0), Size(0.003, 3.0, 7.0)),
+    Name.FORCE_OFFSET.value: (Size(0.005, 2.0, 6.0), Size(0.003, 3.0, 8.0)),
+    Name.FORCE_DRIFT.value: (Size(0.002, 3.0, 12.0), Size(0.002, 3.0, 10.0)),
+    Name.LENGTH_GAIN.value: (Size(0.02, 2.0, 6.0), Size(0.01, 4.0, 10.0)),
+    Name.TIME_SHIFT.value: (Size(5e-4, 2.0, 8.0), Size(7e-4, 3.0, 6.0)),
+    Name.TRANSDUCER_LAG.value: (Size(5e-4, 2.0, 8.0), Size(7e-4, 3.0, 6.0)),
+}
+PRIORS: Mapping[str, Size] = MappingProxyType({name: of_single for name, (of_single, _) in _SIZES.items()})
 """Of singles, by name: one prior SD, and how many SDs an artefact has."""
+ARTEFACTS: Mapping[str, Size] = MappingProxyType({name: of_composite for name, (_, of_composite) in _SIZES.items()})
+"""Of composites, by name."""
+# A drift and a lag are no part of a careful study.
 ORDINARY: Mapping[str, float] = MappingProxyType(
     {
-        Name.PCA_SHIFT.value: 0.04,
-        Name.RUN_DOWN.value: 0.003,
-        Name.FORCE_OFFSET.value: 0.003,
-        Name.LENGTH_GAIN.value: 0.01,
-        Name.TIME_SHIFT.value: 7e-4,
+        name: size.ordinary
+        for name, size in ARTEFACTS.items()
+        if name not in (Name.FORCE_DRIFT.value, Name.TRANSDUCER_LAG.value)
     }
 )
 """Size of every ordinary artefact: SD of pCa of a solution, of the offset of a trial (F0), of a study's length gain and
 time shift (s); the most that run-down takes of the force from trial to trial."""
-ARTEFACTS: Mapping[str, Size] = MappingProxyType(
-    {
-        Name.PCA_SHIFT.value: Size(ORDINARY[Name.PCA_SHIFT.value], 3.0, 6.0),
-        Name.RUN_DOWN.value: Size(ORDINARY[Name.RUN_DOWN.value], 3.0, 7.0),
-        Name.FORCE_OFFSET.value: Size(ORDINARY[Name.FORCE_OFFSET.value], 3.0, 8.0),
-        Name.FORCE_DRIFT.value: Size(0.002, 3.0, 10.0),
-        Name.LENGTH_GAIN.value: Size(ORDINARY[Name.LENGTH_GAIN.value], 4.0, 10.0),
-        Name.TIME_SHIFT.value: Size(ORDINARY[Name.TIME_SHIFT.value], 3.0, 6.0),
-        Name.TRANSDUCER_LAG.value: Size(7e-4, 3.0, 6.0),
-    }
-)
-"""Of composites, by name."""
 # Nobody keeps a fibre that has lost more of its force than this.
 _LOST = 0.3
 

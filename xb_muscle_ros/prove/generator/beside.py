@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import lfilter
 
 from xb_muscle_ros.prove.generator.pieces import compiled
 from xb_muscle_ros.prove.generator.world import SAMPLE_S, Stimulus
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 
 def velocity(length: Array) -> Array:
@@ -82,11 +80,6 @@ def slipping_friction(length: Array, way: float, unevenness: float, release_s: f
     return total
 
 
-def calcium_share(calcium_um: float, half_pca: float, steepness: float) -> float:
-    """Share of sites on titin that calcium occupies."""
-    return float(1.0 / (1.0 + (10.0 ** (6.0 - half_pca) / calcium_um) ** steepness))
-
-
 def bound_titin(length: Array, share: float, stiffness: float, contour: float, rebind_s: float) -> Array:
     """Titin bound to actin where it was when the fibre was activated: a worm-like chain from there on.
 
@@ -113,5 +106,5 @@ def stiffened_titin(length: Array, share: float, stiffness: float, steepness: fl
 
 
 def titin_share(stimulus: Stimulus, shape: dict[str, float]) -> float:
-    """`calcium_share` by an effect's drawn constants."""
-    return calcium_share(stimulus.calcium, shape["half_pca"], shape["hill"])
+    """Share of sites on titin that calcium occupies, by an effect's drawn constants."""
+    return float(1.0 / (1.0 + (10.0 ** (6.0 - shape["half_pca"]) / stimulus.calcium) ** shape["hill"]))

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.prove.generator.artefacts import Artefacts
@@ -19,8 +18,8 @@ from xb_muscle_ros.prove.generator.noise import noise
 from xb_muscle_ros.prove.generator.study import Planned, plan
 from xb_muscle_ros.prove.generator.truth import Truth, study_forces, trial_force
 from xb_muscle_ros.prove.generator.world import Stimulus, World, isometric
+from xb_muscle_ros.trials.trial import Array
 
-Array = npt.NDArray[np.float64]
 C = TypeVar("C", bound="Case")
 
 _ATTEMPTS = 40
@@ -83,24 +82,29 @@ class Case:
         return {}
 
 
-def drawn_until(attempt: Callable[[np.random.Generator, int], C | None], spec: Spec, seed: int, number: int) -> C:
+def drawn_until(
+    attempt: Callable[[Drawn, np.random.Generator, int], C | None], spec: Spec, seed: int, number: int
+) -> C:
     """Draw until the fibre is one that a physiologist would have kept.
 
     Args:
-        attempt: a case of a draw and its number from 0 on; None where it is not usable.
+        attempt: a case of a fibre that was drawn, what draws, and the draw's number from 0 on; None where it is not
+            usable.
 
     Raises:
         UserError: none was found, which tells of a mix that cannot be made.
     """
     for k in range(_ATTEMPTS):
-        case = attempt(np.random.default_rng([seed, number, k + 1]), k)
+        random = np.random.default_rng([seed, number, k + 1])
+        found = _drawn(spec, random)
+        case = None if found is None else attempt(found, random, k)
         if case is not None:
             return case
     what = ", ".join([*spec.labels, *spec.artefacts]) or "null"
     raise UserError(f"case {number} ({what}, {spec.model}): no usable fibre in {_ATTEMPTS} draws; take another seed")
 
 
-def drawn(spec: Spec, random: np.random.Generator) -> Drawn | None:
+def _drawn(spec: Spec, random: np.random.Generator) -> Drawn | None:
     """A fibre with the effects of a spec; None where nobody would keep it for its force at full activation."""
     fibre = str(random.choice(fibres_with(spec.model)))
     given = nominal(fibre, spec.model)
@@ -168,5 +172,5 @@ def rms(parts: Sequence[Array]) -> float:
 
 
 def trial_name(i: int) -> str:
-    """Name of trial i."""
+    """Name of trial i, from 0 on."""
     return f"trial_{i + 1:02d}"

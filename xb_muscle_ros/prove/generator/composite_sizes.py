@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.prove.generator.artefacts import ORDINARY, Artefacts
@@ -18,8 +17,7 @@ from xb_muscle_ros.prove.generator.rest import LinearFit, Rest
 from xb_muscle_ros.prove.generator.study import Planned
 from xb_muscle_ros.prove.generator.truth import study_forces
 from xb_muscle_ros.prove.generator.world import Mesh, Stimulus, World
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 LEAST_F0, MOST_F0 = 0.003, 0.05
 """Bounds of the unique contribution of an effect, F0."""

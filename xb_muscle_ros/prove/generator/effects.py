@@ -8,15 +8,14 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.prove.generator import beside
 from xb_muscle_ros.prove.generator.layout import At, Series, Thick
 from xb_muscle_ros.prove.generator.truth import Truth
 from xb_muscle_ros.prove.generator.world import Acting, Stimulus
+from xb_muscle_ros.trials.trial import Array
 
-Array = npt.NDArray[np.float64]
 Shape = dict[str, float]
 
 _COMPLIANT = ("3state_coop", "2state_coop", "2state")

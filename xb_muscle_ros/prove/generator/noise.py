@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import lfilter
 
 from xb_muscle_ros.prove.generator.world import SAMPLE_S
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 
 def noise(random: np.random.Generator, n: int, share: float) -> tuple[Array, float]:

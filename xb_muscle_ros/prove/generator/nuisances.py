@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.prove.generator.artefacts import PRIORS
@@ -13,8 +12,7 @@ from xb_muscle_ros.prove.generator.refit import Refit, Refitted
 from xb_muscle_ros.prove.generator.study import Planned
 from xb_muscle_ros.prove.generator.truth import Truth, study_forces
 from xb_muscle_ros.prove.generator.world import SAMPLE_S, World
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 _SHIFT, _GAIN = 0.01, 0.01
 # Ten independent observations of 0.3 % F0 a trial.

@@ -6,12 +6,10 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.prove.generator.world import SAMPLE_S, Stimulus
-from xb_muscle_ros.trials.trial import Phase
+from xb_muscle_ros.trials.trial import Array, Phase
 
-Array = npt.NDArray[np.float64]
 Piece = tuple[str, float, float]
 """Name of a phase, duration (s), change of length (L0)."""
 

@@ -13,13 +13,12 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
 from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND
+from xb_muscle_ros.trials.trial import Array
 
-Array = npt.NDArray[np.float64]
 Key = tuple[str, str]
 """Fibre and trial."""
 

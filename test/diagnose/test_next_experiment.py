@@ -12,8 +12,7 @@ from made_trials import truth
 from xb_muscle_ros.diagnose import next_experiment
 from xb_muscle_ros.diagnose.component import Component, Kind
 from xb_muscle_ros.diagnose.names import FAMILY, Name
-from xb_muscle_ros.diagnose.next_experiment import menu, propose, scaled
-from xb_muscle_ros.diagnose.planning import _pairs
+from xb_muscle_ros.diagnose.next_experiment import _pairs, menu, propose, scaled
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import changed
 from xb_muscle_ros.models.muscle import Muscle

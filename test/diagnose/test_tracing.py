@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from xb_muscle_ros.diagnose.inference.direction import direction
 from xb_muscle_ros.diagnose.noise.cells import Residual
+from xb_muscle_ros.diagnose.tracing import direction
 from xb_muscle_ros.trials.trial import Phase
 
 PHASES = (
