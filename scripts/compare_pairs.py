@@ -25,6 +25,7 @@ from xb_muscle_ros.diagnose.search.system import Names, ordered
 from xb_muscle_ros.diagnose.searching import fit_base
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import write_text
+from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.tables import NOTHING, markdown, number
 
 
@@ -75,7 +76,7 @@ def table(explorer: Explorer, heldout: HeldOut, sets: Sequence[Names]) -> str:
 
 def main(given: argparse.Namespace) -> None:
     """Fit all sets and write the table."""
-    studies = read_fibres(given.bags, given.fiber, given.model, None, None, None)
+    studies = read_fibres(given.bags, [load_fibre(name, given.model) for name in given.fiber])
     effort = QUICK if given.quick else Effort()
     study = fit_base(
         studies, effort, 1, work_options_of(given, journal=given.journal), {}, error_sds_of(given.nuisance)

@@ -36,13 +36,7 @@ class Protocol(NamedTuple):
 
 
 class Proposal(NamedTuple):
-    """What to do next.
-
-    Attributes:
-        protocol: what to record.
-        separates: names of the components that it separates.
-        difference_f0: root-mean-square by which they differ there.
-    """
+    """What to record next, the components that it separates, and the root-mean-square by which they differ there."""
 
     protocol: Protocol
     separates: tuple[str, ...]

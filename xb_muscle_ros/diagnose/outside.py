@@ -25,12 +25,9 @@ _WORSE_F0 = 0.01
 
 
 def warnings(fibre: Fibre, base: Fibre, trials: Sequence[FitTrial]) -> list[str]:
-    """Lines on absurd forces: passive at the longest length of the study, active at twice its speeds.
+    """Lines on absurd forces of an answer, of which the fitted base has less.
 
-    Args:
-        fibre: with the answer's mechanisms.
-        base: fitted without.
-        trials: of the study.
+    They are passive at the longest length of the study, and active at twice its speeds.
     """
     found = []
     longest = max(trials, key=lambda t: float(np.max(t.length_l0)))

@@ -12,7 +12,6 @@ from xb_muscle_ros.diagnose.answers import MECHANISMS
 from xb_muscle_ros.diagnose.component import Component
 from xb_muscle_ros.diagnose.effort import Effort
 from xb_muscle_ros.diagnose.inference.answer import answer_of, components, verdict_of
-from xb_muscle_ros.diagnose.inference.shares import explained
 from xb_muscle_ros.diagnose.names import MEASUREMENT
 from xb_muscle_ros.diagnose.next_experiment import plan, scaled
 from xb_muscle_ros.diagnose.noise.closure import by_distribution
@@ -47,7 +46,7 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
     after = [study.around(chosen, i) if chosen else before[i] for i in range(count)]
     of_answer = [study.recordings[i].significance(after[i]) if chosen else study.base[i] for i in range(count)]
     traces = traced(study, chosen, before, after)
-    found = _by_component([directed(study, c, traces) for c in components(judged)])
+    found = _by_component([directed(c, traces) for c in components(judged)])
     detected = any(s.detected() for s in study.base)
     described = _described(study, before, after)
     fine = all(
@@ -80,7 +79,7 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
         verdict=verdict,
         answer=answer,
         components=found,
-        explained_fraction=explained(study.explorer, chosen, judged.noise_f0) if chosen else 0.0,
+        explained_fraction=judged.explained(chosen) if chosen else 0.0,
         mismatch=rows.places(names, study.base),
         p_value=min(1.0, count * min(s.overall_p for s in study.base)),
         described=described,

@@ -58,7 +58,8 @@ def of_trials(study: Searched, chosen: Names, traces: Sequence[Traced]) -> tuple
     for t in traces:
         name = t.residual.trial
         noise = study.recordings[t.fibre].noise.of([name]).trials[0]
-        held = [study.judged.heldout.rmsd_by_trial(s).get((t.fibre, name)) for s in ((), chosen)]
+        held = (study.judged.heldout.rmsd_by_trial(s).get((t.fibre, name), np.inf) for s in ((), chosen))
+        held_before, held_after = (value if np.isfinite(value) else None for value in held)
         rows.append(
             OfTrial(
                 fibre=study.fibres[t.fibre].name,
@@ -70,8 +71,8 @@ def of_trials(study: Searched, chosen: Names, traces: Sequence[Traced]) -> tuple
                 noise_samples=noise.samples,
                 before_rmsd_f0=rmsd(t.forces.before_f0 - t.forces.measured_f0),
                 after_rmsd_f0=rmsd(t.forces.after_f0 - t.forces.measured_f0),
-                heldout_before_f0=held[0] if held[0] is not None and np.isfinite(held[0]) else None,
-                heldout_after_f0=held[1] if held[1] is not None and np.isfinite(held[1]) else None,
+                heldout_before_f0=held_before,
+                heldout_after_f0=held_after,
             )
         )
     return tuple(rows)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -110,29 +110,25 @@ def _without(study: Searched, chosen: Names, name: Name, i: int) -> list[Array] 
         return None
 
 
-def directed(study: Searched, c: Component, traces: Sequence[Traced]) -> Component:
+def directed(c: Component, traces: Sequence[Traced]) -> Component:
     """A component of the answer with what it does to the force."""
     name = c.members[0]
-    adds: dict[str, list[tuple[Residual, Array]]] = {}
-    for t in traces:
-        if name in t.forces.without_f0:
-            adds.setdefault(t.forces.fibre, []).append((t.residual, t.forces.adds_f0(name)))
+    adds = [(t.residual, t.forces.adds_f0(name)) for t in traces if name in t.forces.without_f0]
     return replace(c, direction=direction(adds)) if adds else c
 
 
-def direction(adds_f0: Mapping[str, Sequence[tuple[Residual, Array]]]) -> str:
-    """Where a component raises force most and where it lowers it most.
+def direction(adds_f0: Sequence[tuple[Residual, Array]]) -> str:
+    """Where a component raises force most and where it lowers it most, in plain words.
 
     Args:
-        adds_f0: by fibre, for each trial what the component adds to the force at the residual's times.
+        adds_f0: for each trial what the component adds to the force at the residual's times, F0.
     """
     sums: dict[str, list[float]] = {}
-    for trials in adds_f0.values():
-        for residual, adds in trials:
-            for phase in residual.phases:
-                inside = (residual.time_s >= phase.start_s) & (residual.time_s <= phase.end_s)
-                if np.any(inside):
-                    sums.setdefault(phase_words(phase.name), []).append(float(np.mean(adds[inside])))
+    for residual, adds in adds_f0:
+        for phase in residual.phases:
+            inside = (residual.time_s >= phase.start_s) & (residual.time_s <= phase.end_s)
+            if np.any(inside):
+                sums.setdefault(phase_words(phase.name), []).append(float(np.mean(adds[inside])))
     if not sums:
         return ""
     means = {phase: float(np.mean(values)) for phase, values in sums.items()}

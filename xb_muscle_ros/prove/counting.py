@@ -26,8 +26,6 @@ class Score(NamedTuple):
     """A share of cases, or a mean.
 
     Attributes:
-        name: fixed.
-        meaning: in words.
         value: None where no case counts.
         n: cases that count.
         lower, upper: 95 % interval: Clopper–Pearson for shares, bootstrap for medians.

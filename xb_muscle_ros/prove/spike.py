@@ -43,12 +43,7 @@ def spike(
     Args:
         bags: trials of one fibre, with measured force and constant calcium.
         fiber: file with the set of the fibre around which the effects are computed; goes with every case.
-        out: folder of the benchmark.
-        cases: how many.
-        seed: decides everything.
-        key: file for the truths.
-        options: where to work.
-        overwrite: replace another benchmark and its key.
+        out, cases, seed, key, options, overwrite: see `make.make`.
 
     Returns:
         SHA-256 of the key.

@@ -20,7 +20,6 @@ from xb_muscle_ros.diagnose.inference.calibration import (
 )
 from xb_muscle_ros.diagnose.inference.heldout import HeldOut
 from xb_muscle_ros.diagnose.inference.population import distribution
-from xb_muscle_ros.diagnose.inference.shares import unique
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.diagnose.search.explore import Explorer
@@ -91,6 +90,27 @@ class Judged:
         raised = self.averages.fitted_alone.log_odds(group) - self.without_fibres[fibre].fitted_alone.log_odds(group)
         return min(max(raised, -MOST_LOG_ODDS), MOST_LOG_ODDS) if math.isfinite(raised) else None
 
+    def explained(self, names: Names) -> float:
+        """Share of the base's mean square beyond noise that a set takes away; between 0 and 1."""
+        before = self._excess((), None)
+        return float(np.clip(1.0 - self._excess(names, None) / before, 0.0, 1.0)) if before > 0.0 else 0.0
+
+    def ablation_loss(self, names: Names, without: Names, fibre: int | None = None) -> float:
+        """What a set loses without a part of it, all else fitted anew, as a share of the base's mismatch."""
+        before = self._excess((), fibre)
+        if before <= 0.0 or without not in self.explorer.fits:
+            return 0.0
+        back = self._squares(without, fibre) - self._squares(names, fibre)
+        return float(np.clip(back / before, 0.0, 1.0))
+
+    def _squares(self, names: Names, fibre: int | None) -> float:
+        fits = self.explorer.fits[names]
+        return float(sum(fit.mean_square_f0 for fit in (fits if fibre is None else [fits[fibre]])))
+
+    def _excess(self, names: Names, fibre: int | None) -> float:
+        noise_f0 = self.noise_f0 if fibre is None else [self.noise_f0[fibre]]
+        return self._squares(names, fibre) - sum(noise**2 for noise in noise_f0)
+
     @property
     def chosen(self) -> Names:
         """The set that stands for the answer: the most probable one with every component that is named and no other.
@@ -122,14 +142,14 @@ def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Compon
     without = tuple(n for n in chosen if n is not own)
     share, gain = 0.0, None
     if own is not None:
-        share = unique(e, chosen, without, judged.noise_f0)
+        share = judged.ablation_loss(chosen, without)
         gain = judged.heldout.gain(chosen, without)
-    best = _set_with(judged, lead)
+    best = max((s for s in e.fits if lead in s), key=e.evidence, default=None)
     by_fibre = tuple(
         OfFibre(
             fibre=system.fibre.name,
             inclusion_probability=judged.probability(group, i),
-            ablation_loss=unique(e, chosen, without, judged.noise_f0, i) if own is not None else 0.0,
+            ablation_loss=judged.ablation_loss(chosen, without, i) if own is not None else 0.0,
             heldout_gain=judged.heldout.gain(chosen, without, i) if own is not None else None,
             parameters=() if best is None else _of_one(judged, best, lead, i),
             replication=judged.replication(group, i),
@@ -150,12 +170,6 @@ def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Compon
         log_odds=min(max(judged.averages.log_odds(group), -MOST_LOG_ODDS), MOST_LOG_ODDS),
         contribution_f0=judged.averages.contribution_f0(group),
     )
-
-
-def _set_with(judged: Judged, name: Name) -> Names | None:
-    """The set with the most evidence that has a name."""
-    having = [s for s in judged.explorer.fits if name in s]
-    return max(having, key=judged.explorer.evidence, default=None)
 
 
 def _of_one(judged: Judged, names: Names, name: Name, i: int) -> tuple[Parameter, ...]:

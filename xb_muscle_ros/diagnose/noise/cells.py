@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -83,6 +84,18 @@ def check(residuals: Sequence[Residual]) -> None:
             raise UserError(f"trial {r.trial}: the residual is not finite; leave the trial out")
         if np.any(np.diff(r.time_s) <= 0.0):
             raise UserError(f"trial {r.trial}: times of the residual do not increase; sort the samples")
+
+
+def slices(residuals: Sequence[Residual], samples: int) -> list[slice]:
+    """Where the samples of each trial are, all one below the other.
+
+    Raises:
+        UserError: a fit's slopes have another number of samples.
+    """
+    edges = np.cumsum([0, *(r.time_s.size for r in residuals)]).tolist()
+    if edges[-1] != samples:
+        raise UserError(f"residuals have {edges[-1]} samples, the fit's slopes {samples}; give the same")
+    return [slice(a, b) for a, b in itertools.pairwise(edges)]
 
 
 def cut(residuals: Sequence[Residual]) -> tuple[Cell, ...]:

@@ -7,14 +7,13 @@ freely, is chosen by cross-validation over the training trials; where it does no
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.noise.cells import Residual
+from xb_muscle_ros.diagnose.noise.cells import Residual, slices
 from xb_muscle_ros.diagnose.noise.law import exponential_basis, scales
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.linear_fit import LinearFit
@@ -57,8 +56,7 @@ def discrepancy(
     known = scales(residuals, fit, scalings)
     if len(held_out) != len(residuals):
         raise UserError(f"{len(held_out)} marks of held-out trials for {len(residuals)} trials; give one each")
-    edges = np.cumsum([0, *(r.time_s.size for r in residuals)])
-    parts = [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
+    parts = slices(residuals, fit.slopes.shape[0])
     train = [part for part, out in zip(parts, held_out, strict=True) if not out]
     held = [part for part, out in zip(parts, held_out, strict=True) if out]
     if not train:

@@ -7,16 +7,14 @@ coordinates could have taken is taken out of each before it is compared with the
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import nnls
 
-from xb_muscle_ros.diagnose.noise.cells import Residual, check
+from xb_muscle_ros.diagnose.noise.cells import Residual, check, slices
 from xb_muscle_ros.diagnose.residual import ResidualLaw
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.linear_fit import LinearFit
@@ -67,7 +65,6 @@ def law(
     """
     known = scales(residuals, fit, scalings)
     target = np.concatenate([r.value_f0 for r in residuals])
-    edges = np.cumsum([0, *(r.time_s.size for r in residuals)])
     if float(np.sqrt(np.mean(target**2))) < _LEAST_F0:
         return None
     plain = np.concatenate([exponential_basis(r.time_s, np.diff(r.length_l0), TAU_S) for r in residuals])
@@ -76,7 +73,7 @@ def law(
     for name, scale in known.items():
         columns = plain * scale[:, None]
         sizes = np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300)
-        products = _Products(fit.residual(columns / sizes), target, edges)
+        products = _Products(fit.residual(columns / sizes), target, slices(residuals, target.size))
         for sign in (1, -1):
             share = products.explained(sign)
             shares[name] = max(share, shares.get(name, -math.inf))
@@ -102,9 +99,8 @@ def law(
 class _Products:
     """Products of columns and of columns with the target, trial by trial: all that least squares needs."""
 
-    def __init__(self, columns: Array, target: Array, edges: npt.NDArray[np.int64]) -> None:
-        self.columns, self.target = columns, target
-        self.parts = [slice(a, b) for a, b in itertools.pairwise(edges)]
+    def __init__(self, columns: Array, target: Array, parts: list[slice]) -> None:
+        self.columns, self.target, self.parts = columns, target, parts
         self.gram = np.array([columns[s].T @ columns[s] for s in self.parts])
         self.across = np.array([columns[s].T @ target[s] for s in self.parts])
         # In units of columns before the fit took its part: a response that it took stays small.
@@ -131,8 +127,7 @@ def scales(residuals: Sequence[Residual], fit: LinearFit, scalings: Mapping[str,
     """What a law may scale with, all trials one below the other, the constant first."""
     check(residuals)
     sizes = [r.time_s.size for r in residuals]
-    if sum(sizes) != fit.slopes.shape[0]:
-        raise UserError(f"residuals have {sum(sizes)} samples, the fit's slopes {fit.slopes.shape[0]}; give the same")
+    slices(residuals, fit.slopes.shape[0])
     out = {CONSTANT: np.ones(sum(sizes))}
     for name, arrays in scalings.items():
         if [a.size for a in arrays] != sizes:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from xb_muscle_ros.diagnose.noise.cells import Residual
+from xb_muscle_ros.diagnose.noise.cells import Residual, slices
 from xb_muscle_ros.diagnose.noise.discrepancy import discrepancy
 from xb_muscle_ros.diagnose.noise.law import law
 from xb_muscle_ros.diagnose.noise.significance import Significance, significance
@@ -112,8 +112,8 @@ class Recordings:
             weights = around.fit.weights * np.repeat([0.0 if h else 1.0 for h in held], [r.time_s.size for r in found])
             without = LinearFit(around.fit.slopes, weights, around.fit.prior)
             value = without.residual(around.residual_f0[:, None])[:, 0]
-            edges = np.cumsum([0, *(r.time_s.size for r in found)])
-            here = [r._replace(value_f0=value[a:b]) for r, a, b in zip(found, edges[:-1], edges[1:], strict=True)]
+            parts = slices(found, value.size)
+            here = [r._replace(value_f0=value[part]) for r, part in zip(found, parts, strict=True)]
             predicted = discrepancy(here, held, without, scalings).predicted_f0
             held_out = [r.value_f0 for r, h in zip(here, held, strict=True) if h]
             total += sum(float(np.sum((v - p) ** 2)) for v, p in zip(held_out, predicted, strict=True))

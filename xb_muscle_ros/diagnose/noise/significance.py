@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.noise.cells import Cell, Residual, cut, exceeding, mean, phase_names, rms
+from xb_muscle_ros.diagnose.noise.cells import Cell, Residual, cut, exceeding, mean, phase_names, rms, slices
 from xb_muscle_ros.diagnose.residual import Place, ResidualMap
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.linear_fit import LinearFit
@@ -193,7 +193,7 @@ def null_residuals(
         UserError: see `significance`.
     """
     times_s = [r.time_s for r in residuals]
-    samples = _check_samples(residuals, fit)
+    samples = slices(residuals, fit.slopes.shape[0])[-1].stop
     if draws < 20:
         raise UserError(f"{draws} draws of noise; at least 20 are needed")
     chosen = noise.of([r.trial for r in residuals])
@@ -210,7 +210,7 @@ def sharpened(residuals: Sequence[Residual], fit: LinearFit, noise: NoiseModel) 
     Raises:
         UserError: see `significance`.
     """
-    _check_samples(residuals, fit)
+    slices(residuals, fit.slopes.shape[0])
     variances = []
     for r, of_trial in zip(residuals, noise.of([r.trial for r in residuals]).trials, strict=True):
         # Integrated autocorrelation time: so many samples are worth one independent one.
@@ -220,14 +220,6 @@ def sharpened(residuals: Sequence[Residual], fit: LinearFit, noise: NoiseModel) 
     used = weighted[fit.weights > 0.0]
     factor = 1.0 / math.sqrt(float(np.mean(used))) if used.size else 1.0
     return replace(fit, weights=fit.weights * max(factor, 1.0))
-
-
-def _check_samples(residuals: Sequence[Residual], fit: LinearFit) -> int:
-    """Samples of all trials."""
-    samples = sum(r.time_s.size for r in residuals)
-    if samples != fit.slopes.shape[0]:
-        raise UserError(f"residuals have {samples} samples, the fit's slopes {fit.slopes.shape[0]}; give the same")
-    return samples
 
 
 def family_wise(found: Array, null: Array) -> Array:

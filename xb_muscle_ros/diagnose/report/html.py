@@ -35,12 +35,7 @@ _LEAST = 0.05
 
 
 def as_html(d: Diagnosis, traces: Sequence[TrialTraces]) -> str:
-    """The report.
-
-    Args:
-        d: the diagnosis.
-        traces: of its trials; figures of forces show those that there are.
-    """
+    """The report; figures of forces show the trials of which there are traces."""
     page: str = _environment().get_template("page.html.j2").render(_context(d, traces))
     return page
 

@@ -82,25 +82,9 @@ def _on_input(what: str, change: Callable[[Stimulus, float, Shape], Array]) -> C
     return apply
 
 
-def _beside(force: Callable[[Stimulus, float, Shape], Array]) -> Callable[[Truth, float, Shape], Truth]:
-    """An effect that is an element beside the heads, whose force is a function of the stimulus."""
-    return lambda truth, scale, shape: truth.adding(lambda stimulus, _: force(stimulus, scale, shape))
-
-
-def _drag(s: Stimulus, scale: float, shape: Shape) -> Array:
-    return beside.saturating_drag(s.length, scale, shape["bend"])
-
-
-def _viscoelastic(s: Stimulus, scale: float, shape: Shape) -> Array:
-    return beside.power_law_relaxation(s.length, scale, shape["exponent"], shape["steepness"])
-
-
-def _titin(s: Stimulus, scale: float, shape: Shape) -> Array:
-    return beside.bound_titin(s.length, beside.titin_share(s, shape), scale, shape["contour"], shape["rebind_s"])
-
-
-def _stiffened(s: Stimulus, scale: float, shape: Shape) -> Array:
-    return beside.stiffened_titin(s.length, beside.titin_share(s, shape), scale, shape["steepness"])
+def _beside(force: Callable[..., Array]) -> Callable[[Truth, float, Shape], Truth]:
+    """An effect that is an element beside the heads, whose force is a function of the stimulus, scale and form."""
+    return lambda truth, scale, shape: truth.adding(lambda stimulus, _: force(stimulus, scale, **shape))
 
 
 def _sensitivity(s: Stimulus, scale: float, shape: Shape) -> Array:
@@ -198,10 +182,13 @@ def _damaged(truth: Truth, scale: float, shape: Shape) -> Truth:
 
 _TITIN = {"half_pca": (6.0, 6.4), "hill": (2.0, 4.0)}
 _ROWS = (
-    Effect(Name.VISCOUS_DRAG.value, "drag at low speed, s", _ALL, 0.01, 0.1, _between(bend=(0.3, 2.0)), _beside(_drag)),
+    Effect(
+        Name.VISCOUS_DRAG.value, "drag at low speed, s", _ALL, 0.01, 0.1, _between(bend=(0.3, 2.0)),
+        _beside(beside.saturating_drag),
+    ),
     Effect(
         Name.PASSIVE_VISCOELASTICITY.value, "stiffness, F0/L0", _ALL, 1.0, 15.0,
-        _between(exponent=(0.1, 0.4), steepness=(10.0, 30.0)), _beside(_viscoelastic),
+        _between(exponent=(0.1, 0.4), steepness=(10.0, 30.0)), _beside(beside.power_law_relaxation),
     ),
     Effect(
         Name.WEAKLY_BOUND_HEADS.value, "stiffness, cross-bridge force per power stroke", _ALL, 0.05, 0.5,
@@ -214,11 +201,11 @@ _ROWS = (
     ),
     Effect(
         Name.ACTIVE_TITIN.value, "stiffness when bound, F0/L0", _ALL, 2.0, 20.0,
-        _between(contour=(0.12, 0.25), rebind_s=(0.03, 0.3), **_TITIN), _beside(_titin),
+        _between(contour=(0.12, 0.25), rebind_s=(0.03, 0.3), **_TITIN), _beside(beside.bound_titin),
     ),
     Effect(
         Name.STATIC_CALCIUM_STIFFNESS.value, "stiffness, F0/L0", _ALL, 2.0, 20.0,
-        _between(steepness=(5.0, 20.0), **_TITIN), _beside(_stiffened),
+        _between(steepness=(5.0, 20.0), **_TITIN), _beside(beside.stiffened_titin),
     ),
     Effect(
         Name.LENGTH_DEPENDENT_ACTIVATION.value, "pCa50 per length, 1/L0", _ALL, 1.5, 12.0, _between(),

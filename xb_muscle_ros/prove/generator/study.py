@@ -61,7 +61,7 @@ def plan(
     between = [float(p) for p in grid if 0.15 * full <= force_of(float(p)) <= 0.85 * full]
     if len(between) < 3:
         return None
-    chosen = _spread_over(random, between, _levels(trials))
+    chosen = _spread_over(random, between, 3 + sum(trials >= more for more in _MORE_LEVELS))
     levels = [9.0, 4.5, *chosen]
     again = [*chosen, 4.5] if trials < _RELAXED_AGAIN else [*chosen, 4.5, 9.0]
     while len(levels) < trials:
@@ -74,11 +74,6 @@ def plan(
     first = [str(kind) for kind in random.choice(["paper", "slow", "fast"], 2)]
     planned = [_trial(random, kind, pca, gentle) for kind, pca in zip([*first, *kinds], levels, strict=False)]
     return [planned[i] for i in random.permutation(trials)]
-
-
-def _levels(trials: int) -> int:
-    """How many levels of calcium between rest and full activation a study of so many trials has."""
-    return 3 + sum(trials >= more for more in _MORE_LEVELS)
 
 
 def _spread_over(random: np.random.Generator, between: Sequence[float], count: int) -> list[float]:
