@@ -69,7 +69,7 @@ def table(explorer: Explorer, heldout: HeldOut, sets: Sequence[Names]) -> str:
         held = [number(c, ".2f", 100.0) for c in cells]
         share = NOTHING if cells[-1] is None or not base else f"{cells[-1] / base:.2f}"
         gained = explorer.evidence(names) - explorer.evidence(())
-        title = " + ".join(f"`{n.value}`" for n in names) or "nothing"
+        title = " + ".join(f"`{n}`" for n in names) or "nothing"
         rows.append([title, f"{gained:+.1f}", f"{100.0 * fitted:.2f}", *held, share])
     return markdown(head, rows) + "\n"
 

@@ -25,7 +25,7 @@ DRAG, TITIN, STIFFNESS, SHIFT = (
 
 def component(probability: float, *names: Name) -> Component:
     kind = Kind.ARTEFACT if names[0] is SHIFT else Kind.MECHANISM
-    return Component(names[0].value, kind, FAMILY[names[0]], tuple(n.value for n in names), probability)
+    return Component(names[0], kind, FAMILY[names[0]], names, probability)
 
 
 SETS: dict[Any, float] = {(): 0.0, (DRAG,): 3.0, (TITIN,): 2.5, (DRAG, TITIN): 2.8, (DRAG, SHIFT): 2.9}

@@ -130,8 +130,7 @@ def diagnosed(found: dict[str, Any]) -> Diagnosis:
     plain, first = nothing().diagnosis, found["first_mismatch"]
     named = [Name(name) for name in found["answer"]]
     components = tuple(
-        Component(n.value, Kind.ARTEFACT if n in MEASUREMENT else Kind.MECHANISM, FAMILY[n], (n.value,), 0.8)
-        for n in named
+        Component(n, Kind.ARTEFACT if n in MEASUREMENT else Kind.MECHANISM, FAMILY[n], (n,), 0.8) for n in named
     )
     held = {
         when: replace(getattr(plain, when), heldout_rmsd_f0=found.get(f"{when}_heldout_f0"))
@@ -141,7 +140,7 @@ def diagnosed(found: dict[str, Any]) -> Diagnosis:
     return replace(
         plain,
         verdict=Verdict(found["verdict"]),
-        answer=tuple(n.value for n in named if n not in MEASUREMENT),
+        answer=tuple(n for n in named if n not in MEASUREMENT),
         components=components,
         mismatch=(place,) if place else (),
         **held,

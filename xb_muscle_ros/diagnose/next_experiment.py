@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -9,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from xb_muscle_ros.diagnose.component import Component, Kind
-from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
+from xb_muscle_ros.diagnose.names import MEASUREMENT
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.searching import Searched
 from xb_muscle_ros.errors import UserError
@@ -45,13 +46,8 @@ class Proposal(NamedTuple):
 
 def menu(fibre: str, pcas: Sequence[float]) -> list[Protocol]:
     """Ramps and holds at some pCa, fast and slow, up and down, from rest length and from a longer one."""
-    found = []
-    for pca in pcas:
-        for start in _LENGTHS_L0:
-            for amplitude in _AMPLITUDES_L0:
-                for speed in _SPEEDS_L0_PER_S:
-                    found.append(_ramp(fibre, pca, start, amplitude, speed))
-    return found
+    grid = itertools.product(pcas, _LENGTHS_L0, _AMPLITUDES_L0, _SPEEDS_L0_PER_S)
+    return [_ramp(fibre, *row) for row in grid]
 
 
 def _ramp(fibre: str, pca: float, start_l0: float, amplitude_l0: float, speed: float) -> Protocol:
@@ -124,21 +120,16 @@ def _pairs(sets: dict[Names, float], found: Sequence[Component]) -> list[tuple[t
     )
     pairs = []
     for c in unsure[:3]:
-        members = [Name(m) for m in c.members]
-        if len(members) > 1:
-            first, second = ([s for s in sets if m in s] for m in members[:2])
-            names = (members[0].value, members[1].value)
-        else:
-            first = [s for s in sets if members[0] in s]
-            second = [s for s in sets if members[0] not in s]
-            names = (members[0].value, "")
+        members = c.members[:2]
+        first, *others = ([s for s in sets if m in s] for m in members)
+        second = others[0] if others else [s for s in sets if members[0] not in s]
         if not first or not second:
             continue
         best = max(first, key=lambda s: sets[s]), max(second, key=lambda s: sets[s])
-        others = [n.value for n in best[1] if n not in best[0] and n not in MEASUREMENT]
-        label = names[1] or (others[0] if others else "")
-        if {n for n in best[0] if n not in MEASUREMENT} != {n for n in best[1] if n not in MEASUREMENT}:
-            pairs.append((best, tuple(n for n in (names[0], label) if n)))
+        one, other = ([n for n in names if n not in MEASUREMENT] for names in best)
+        if set(one) != set(other):
+            instead = (n for n in other if n not in one)
+            pairs.append((best, (*members, *instead)[:2]))
     return pairs
 
 

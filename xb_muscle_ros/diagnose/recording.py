@@ -173,7 +173,7 @@ def _sets(study: Searched) -> tuple[SetOfMechanisms, ...]:
     chances = averages.probability
     return tuple(
         SetOfMechanisms(
-            names=tuple(n.value for n in averages.sets[k]),
+            names=averages.sets[k],
             probability=float(chances[k]),
             log_evidence=float(averages.log_evidence[k]),
             rmsd_f0=float(np.sqrt(averages.mean_square_f0[k])),
@@ -193,7 +193,7 @@ def _augmented(study: Searched, chosen: Names) -> dict[str, Fibre]:
     for i, given in enumerate(study.fibres):
         fibre = only(study.fibre_with(chosen, i), given, names)
         fibre = by_distribution(fibre) if study.recorded[i].closure_f0 else fibre
-        words = " and ".join(n.value for n in names)
+        words = " and ".join(names)
         trials = len(study.recorded[i].trials)
         source = f"fitted by this package to {trials} trials of fibre {fibre.name}, with {words} (diagnosed)"
         made[augmented_name(given.name, len(study.fibres) > 1)] = replace(fibre, source=source)
@@ -235,5 +235,5 @@ def _notes(study: Searched, chosen: Names, effort: Effort) -> list[str]:
         ]
         lines += [f"fibre {study.fibres[i].name}: {line}" if several else line for line in own]
     allowed = set.intersection(*(set(beside(f)) for f in study.fibres))
-    left_out = [n.value for n in MECHANISMS if n not in allowed]
+    left_out = [n for n in MECHANISMS if n not in allowed]
     return [*lines, *notes.of_search(study.explorer.unsolved, left_out)]

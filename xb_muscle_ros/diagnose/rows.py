@@ -39,7 +39,7 @@ def scores(study: Searched, names: Names, i: int | None = None) -> Scores:
     """How far a set is from the recordings, of all fibres or of one."""
     chosen = range(len(study.fibres)) if i is None else [i]
     squares = np.concatenate([study.around(names, k).residual_f0 for k in chosen])
-    return Scores(tuple(n.value for n in names), rmsd(squares), study.judged.heldout.rmsd(names, i))
+    return Scores(names, rmsd(squares), study.judged.heldout.rmsd(names, i))
 
 
 def benchmark(study: Searched, before: Sequence[Around]) -> float | None:

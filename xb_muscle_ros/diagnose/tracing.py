@@ -67,7 +67,7 @@ def traced(study: Searched, chosen: Names, before: Sequence[Around], after: Sequ
                 after_f0=fits[1][k],
                 heldout_before_f0=held[0],
                 heldout_after_f0=held[1],
-                without_f0={n.value: p[k] for n, p in parts.items() if p is not None},
+                without_f0={n: p[k] for n, p in parts.items() if p is not None},
             )
             found.append(Traced(i, residuals[k], forces))
     return found
@@ -97,7 +97,7 @@ def _without(study: Searched, chosen: Names, name: Name, i: int) -> list[Array] 
         z = problem.start.copy()
         if name in MEASUREMENT:
             for j, c in enumerate(problem.coordinates):
-                if c.name == name.value:
+                if c.name == name:
                     z[j] = 0.0
             return problem.predicted(z)
         gone = CATALOGUE[name].absent

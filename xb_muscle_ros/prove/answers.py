@@ -14,8 +14,7 @@ from xb_muscle_ros.work import JsonValue
 NO_DIAGNOSIS = "error"
 """Verdict of a case that the tool could not do."""
 FAMILIES_OF_PHYSICS = tuple(dict.fromkeys(FAMILY[name] for name in MECHANISMS))
-_PHYSICS = {*(name.value for name in MECHANISMS), *FAMILIES_OF_PHYSICS}
-_FAMILY: Mapping[str, str] = {name.value: family for name, family in FAMILY.items()}
+_PHYSICS = {*MECHANISMS, *FAMILIES_OF_PHYSICS}
 
 
 class Statement(NamedTuple):
@@ -135,4 +134,4 @@ def _statement(row: Mapping[str, Any]) -> Statement:
 
 def _bare(name: str) -> Statement:
     """A name that stands alone; one that is neither mechanism nor artefact is taken for a family's."""
-    return Statement(name, _FAMILY.get(name, name), name in _FAMILY, None)
+    return Statement(name, FAMILY.get(name, name), name in FAMILY, None)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from scipy.stats import binomtest
 
-from xb_muscle_ros.diagnose.names import FAMILY, Name
+from xb_muscle_ros.diagnose.names import FAMILY
 from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.prove.answers import NO_DIAGNOSIS
 from xb_muscle_ros.prove.judging import Judged, JudgedComposite, JudgedEffect, JudgedName, JudgedSingle
@@ -183,7 +183,7 @@ def of_composites(judged: Sequence[JudgedComposite], calibration: Sequence[Score
         share(
             "artefact_found", "artefacts beyond the ordinary: family named",
             (
-                FAMILY[Name(label)] in {name.family for name in j.artefacts_named}
+                FAMILY[label] in {name.family for name in j.artefacts_named}
                 for j in of["artefact"] for label in j.artefacts
             ),
         ),

@@ -15,8 +15,7 @@ from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.prove.answers import Answer, Statement
 
 # A global change of rates is what parameters are for: to call it so is right as well.
-_AS_GOOD_AS_PARAMETERS = {Name.TEMPERATURE.value, Name.PHOSPHATE.value}
-_NAMES = frozenset(name.value for name in FAMILY)
+_AS_GOOD_AS_PARAMETERS = {Name.TEMPERATURE, Name.PHOSPHATE}
 
 
 @dataclass(frozen=True)
@@ -120,7 +119,7 @@ class JudgedComposite(Judged):
 def judge(truth: Mapping[str, Any], found: Answer) -> JudgedSingle:
     """Hold a diagnosis against the truth of a case of singles."""
     labels, first = tuple(truth["labels"]), found.first
-    families = {FAMILY[Name(label)] for label in labels if label in _NAMES}
+    families = {FAMILY[label] for label in labels if label in FAMILY}
     silent = (Verdict.PARAMETERS.value, Verdict.NONE.value)
     as_good = bool(set(labels) & _AS_GOOD_AS_PARAMETERS) and found.verdict in silent
     speaks = found.verdict in (Verdict.PHYSICS.value, Verdict.MEASUREMENT.value, Verdict.AMBIGUOUS.value)
@@ -144,7 +143,7 @@ def judge_composite(truth: Mapping[str, Any], found: Answer) -> JudgedComposite:
     """Hold a diagnosis against the truth of a composite; one that failed says nothing."""
     effects = [effect for effect in truth["effects"] if effect["family"] is not None]
     mechanisms = {str(effect["label"]): str(effect["family"]) for effect in effects}
-    artefacts = {str(name): FAMILY[Name(name)] for name in truth["artefacts"]}
+    artefacts = {str(name): FAMILY[name] for name in truth["artefacts"]}
     named = _judged(found.named_mechanisms, mechanisms)
     families, names = {name.family for name in named}, {name.name for name in named if name.exact_right}
     return JudgedComposite(

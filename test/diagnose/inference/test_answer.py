@@ -22,8 +22,8 @@ NO_BETTER = HeldOutGain(0.04, 0.05, "log RMSD ratio", 5, 0.02, 0.019)
 
 def component(name: Name, probability: float, gain: HeldOutGain | None = BETTER, *others: Name) -> Component:
     kind = Kind.ARTEFACT if name is SHIFT else Kind.MECHANISM
-    members = tuple(n.value for n in (name, *others))
-    return Component(name.value, kind, FAMILY[name], members, probability, heldout_gain=gain)
+    members = (name, *others)
+    return Component(name, kind, FAMILY[name], members, probability, heldout_gain=gain)
 
 
 TABLE = [

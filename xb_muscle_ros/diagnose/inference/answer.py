@@ -74,7 +74,7 @@ class Judged:
         """Inclusion probability of a component, by all fibres or by one."""
         averages = self.averages if fibre is None else self.of_fibres[fibre]
         # The base takes up ordinary errors, however large: what naming one gains is no residual, but its improbability.
-        ordinary = all(n.value in ORDINARY for n in group)
+        ordinary = all(n in ORDINARY for n in group)
         size_f0 = PRACTICAL_F0 if ordinary else averages.contribution_f0(group)
         constants = ARTEFACTS if group[0] in MEASUREMENT else CONSTANTS
         return calibrated(averages.log_odds(group), size_f0, constants)
@@ -145,6 +145,7 @@ def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Compon
         share = judged.ablation_loss(chosen, without)
         gain = judged.heldout.gain(chosen, without)
     best = max((s for s in e.fits if lead in s), key=e.evidence, default=None)
+    members = tuple(sorted(group, key=lambda n: (n is not lead, -judged.averages.including([n]))))
     by_fibre = tuple(
         OfFibre(
             fibre=system.fibre.name,
@@ -157,15 +158,15 @@ def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Compon
         for i, system in enumerate(e.systems)
     )
     return Component(
-        name=lead.value if len(group) == 1 else FAMILY[lead],
+        name=lead if len(group) == 1 else FAMILY[lead],
         kind=Kind.ARTEFACT if lead in MEASUREMENT else Kind.MECHANISM,
         family=FAMILY[lead],
-        members=tuple(n.value for n in sorted(group, key=lambda n: (n is not lead, -judged.averages.including([n])))),
+        members=members,
         inclusion_probability=probability,
         ablation_loss=share,
         heldout_gain=gain,
         parameters=() if best is None else _of_all(judged, best, lead),
-        not_separable_from=tuple(n.value for n in rivals),
+        not_separable_from=tuple(rivals),
         by_fibre=by_fibre,
         log_odds=min(max(judged.averages.log_odds(group), -MOST_LOG_ODDS), MOST_LOG_ODDS),
         contribution_f0=judged.averages.contribution_f0(group),
@@ -176,7 +177,7 @@ def _of_one(judged: Judged, names: Names, name: Name, i: int) -> tuple[Parameter
     """A name's parameters in one fibre."""
     fit = judged.explorer.fits[names][i]
     problem = judged.explorer.systems[i].problem(names, fit.values)
-    wanted = (name.value,) if name in MEASUREMENT else CATALOGUE[name.value].parameters
+    wanted = (name,) if name in MEASUREMENT else CATALOGUE[name].parameters
     rows = []
     for c in problem.coordinates:
         if c.name in wanted:
@@ -197,7 +198,7 @@ def _of_all(judged: Judged, names: Names, name: Name) -> tuple[Parameter, ...]:
     rows = []
     estimates = e.estimates(names)
     coordinates = {c.label: c for c in e.systems[0].problem(names, e.fits[names][0].values).coordinates}
-    for label in CATALOGUE[name.value].parameters:
+    for label in CATALOGUE[name].parameters:
         c, d = coordinates[label], distribution(estimates[label])
         # On a logarithmic scale the spread is that around the centre.
         value = c.outward(d.mean)

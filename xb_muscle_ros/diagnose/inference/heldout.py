@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.diagnose.component import HeldOutGain
-from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.search.descent import Fit, fitted
 from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import SATURATING, Names, System
@@ -55,9 +54,8 @@ def predict_task(task: Mapping[str, Any]) -> list[list[float]] | None:
     """Forces of held-out trials by a set that is fitted without them; None where the model has no solution."""
     system = System.from_json(task["system"])
     trials = [FitTrial.from_json(row) for row in task["trials"]]
-    names = [Name(n) for n in task["names"]]
     held = {t.name for t in trials}
-    found = fitted(system.without(held), names, [task["values"]], task["most"], task["tolerance"])
+    found = fitted(system.without(held), task["names"], [task["values"]], task["most"], task["tolerance"])
     if found is None:
         return None
     closure = {name: np.array(values) for name, values in task["closure_f0"].items()}
@@ -109,7 +107,7 @@ class HeldOut:
                         "system": plain,
                         "trials": [t.to_json() for t in trials],
                         "closure_f0": {t.name: full.closure_f0[t.name].tolist() for t in trials if full.closure_f0},
-                        "names": [n.value for n in names],
+                        "names": list(names),
                         "values": dict(self.explorer.fits[names][i].values),
                         "most": max(2, self.explorer.effort.most // 2),
                         "tolerance": self.explorer.effort.tolerance,

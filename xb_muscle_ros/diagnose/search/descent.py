@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.search.system import Names, System, ordered
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.problem import Problem
@@ -61,12 +60,12 @@ class Fit:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return {**self.__dict__, "names": [n.value for n in self.names]}
+        return {**self.__dict__, "names": list(self.names)}
 
     @staticmethod
     def from_json(row: Mapping[str, Any]) -> Fit:
         """From plain data."""
-        return Fit(**{**row, "names": ordered([Name(n) for n in row["names"]])})
+        return Fit(**{**row, "names": ordered(row["names"])})
 
 
 @dataclass
@@ -249,12 +248,12 @@ class Descent:
 def fit_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
     """Fit a set from the best of several starts; None where the model has no solution at any."""
     system = System.from_json(task["system"])
-    found = fitted(system, [Name(n) for n in task["names"]], task["starts"], task["most"], task["tolerance"])
+    found = fitted(system, task["names"], task["starts"], task["most"], task["tolerance"])
     return None if found is None else found.to_json()
 
 
 def fitted(
-    system: System, names: Collection[Name], starts: Sequence[Mapping[str, float]], most: int, tolerance: float
+    system: System, names: Collection[str], starts: Sequence[Mapping[str, float]], most: int, tolerance: float
 ) -> Fit | None:
     """Fit a set from the best of several starts; None where the model has no solution at any."""
     begun: list[tuple[float, Descent, Array, Array | None]] = []

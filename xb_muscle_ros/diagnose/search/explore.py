@@ -69,7 +69,7 @@ class Explorer:
         tasks = [
             {
                 "system": plain,
-                "names": [n.value for n in names],
+                "names": list(names),
                 "starts": [dict(s) for s in of_fibre],
                 "most": self.effort.most,
                 "tolerance": self.effort.tolerance,
@@ -106,8 +106,8 @@ class Explorer:
         if names not in self._estimates:
             fits = self.fits[names]
             own = [n for n in names if n not in MEASUREMENT]
-            effects = {CATALOGUE[n.value].effect for n in own}
-            labels = dict.fromkeys(label for n in own for label in CATALOGUE[n.value].parameters)
+            effects = {CATALOGUE[n].effect for n in own}
+            labels = dict.fromkeys(label for n in own for label in CATALOGUE[n].parameters)
             found: dict[str, list[Estimate]] = {label: [] for label in labels}
             for system, fit in zip(self.systems, fits, strict=True):
                 coordinates = {c.label: c for c in system.problem(names, fit.values).coordinates}
@@ -178,7 +178,7 @@ class Explorer:
         """Where the fit of a candidate starts in every fibre."""
         if not np.isnan(promised[0].gain):
             return [[*p.starts] for p in promised]
-        catalogue = CATALOGUE[promised[0].name.value]
+        catalogue = CATALOGUE[promised[0].name]
         return [
             [*p.starts, *catalogue.starting_values(s.fibre.values)] for p, s in zip(promised, self.systems, strict=True)
         ]

@@ -36,7 +36,7 @@ BEYOND = 6.0
 """An artefact that is named may be so much larger than an ordinary one."""
 
 
-def ordered(names: Collection[Name]) -> Names:
+def ordered(names: Collection[str]) -> Names:
     """Names of a set in their usual order, each once."""
     return tuple(name for name in NAMES if name in set(names))
 
@@ -46,9 +46,9 @@ def without(names: Names, name: Name) -> Names:
     return tuple(n for n in names if n is not name)
 
 
-def label(names: Collection[Name]) -> str:
+def label(names: Collection[str]) -> str:
     """A set for people and files."""
-    return " + ".join(name.value for name in ordered(names)) or "base"
+    return " + ".join(ordered(names)) or "base"
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class System:
             made = replace(made, features=(*self.features, F0_ANCHOR))
         return made
 
-    def problem(self, names: Collection[Name], values: Mapping[str, float]) -> Problem:
+    def problem(self, names: Collection[str], values: Mapping[str, float]) -> Problem:
         """The fit of a set.
 
         Args:
@@ -125,7 +125,7 @@ class System:
         present = dict(fibre.values)
         coordinates = [c for c in parameter_coordinates(self.fibre, None, (), {}, {}) if c.name in present]
         for name in (n for n in names if n not in MEASUREMENT):
-            entry = CATALOGUE[name.value]
+            entry = CATALOGUE[name]
             start = entry.starting_values(self.fibre.values)[0]
             # What the catalogue starts from besides what is fitted, such as a rate of rebinding.
             present |= {n: float(v) for n, v in start.items() if n in present}
@@ -145,7 +145,7 @@ class System:
 
     def _artefacts(self, names: Names) -> list[Coordinate]:
         """Ordinary measurement errors, wider where named, and those that are in a set only."""
-        named = {n.value for n in names if n in MEASUREMENT}
+        named: set[str] = {n for n in names if n in MEASUREMENT}
         wanted = [n for n in ARTEFACTS if n in ORDINARY or n in named]
         sds = {**self.error_sds, **{n: BEYOND * self.error_sd(n) for n in named}}
         trials, solutions = [t.name for t in self.trials], [t.solution for t in self.trials]

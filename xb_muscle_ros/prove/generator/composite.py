@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.diagnose.names import FAMILY, Name
+from xb_muscle_ros.diagnose.names import FAMILY
 from xb_muscle_ros.prove.generator.artefacts import Artefacts, draw_ordinary, with_artefacts
 from xb_muscle_ros.prove.generator.case import Case, Drawn, drawn_until, forces_of, noises, planned, rms, usable
 from xb_muscle_ros.prove.generator.composite_sizes import LEAST_F0, MOST_F0, Sized
@@ -39,7 +39,7 @@ class Composite(Case):
         """What the key says of composites alone."""
         effects = [
             {
-                **c._asdict(), "family": None if c.label in OUTSIDE else FAMILY[Name(c.label)], "asked_f0": asked,
+                **c._asdict(), "family": None if c.label in OUTSIDE else FAMILY[c.label], "asked_f0": asked,
                 "unique_contribution_f0": size,
             }
             for c, asked, size in zip(self.concealed, self.spec.sizes, self.sizes, strict=True)

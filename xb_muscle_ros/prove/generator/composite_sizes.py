@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -24,12 +24,13 @@ LEAST_F0, MOST_F0 = 0.003, 0.05
 # What one effect may change of the force before any refit (RMS), F0: more, and it is hardly one effect among others.
 _USUAL_CHANGE_F0 = 0.2
 # What stands in for a part of the base changes more.
-_CHANGE_F0 = {
-    name.value: 0.3
-    for name in (Name.SERIES_COMPLIANCE, Name.THIN_FILAMENT_COOPERATIVITY, Name.THICK_FILAMENT_COOPERATIVITY)
+_CHANGE_F0: Mapping[str, float] = {
+    Name.SERIES_COMPLIANCE: 0.3,
+    Name.THIN_FILAMENT_COOPERATIVITY: 0.3,
+    Name.THICK_FILAMENT_COOPERATIVITY: 0.3,
 }
 # Effects that are brief or weak need more than single ones do to be of any size; the change of force bounds them.
-_MORE = {Name.VISCOUS_DRAG.value: 2.0, Name.WEAKLY_BOUND_HEADS.value: 3.0}
+_MORE: Mapping[str, float] = {Name.VISCOUS_DRAG: 2.0, Name.WEAKLY_BOUND_HEADS: 3.0}
 # First-order refits leave so much more than true ones, and so much more yet for each other effect in the model.
 _LINEAR, _BESIDE = 1.7, 0.3
 # A scale that is to change by less than this is near enough.

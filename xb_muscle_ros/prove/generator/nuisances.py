@@ -59,23 +59,23 @@ def artefact_columns(
         return np.concatenate([np.zeros(f.size) if p is None else p for p, f in zip(parts, plain, strict=True)])
 
     columns = []
-    if (sd := sizes.get(Name.PCA_SHIFT.value)) is not None:
+    if (sd := sizes.get(Name.PCA_SHIFT)) is not None:
         by_shift = [(a - b) * sd / _SHIFT for a, b in zip(forces(_SHIFT, 0.0), plain, strict=True)]
         for pca in sorted({trial.pca for trial in study}):
             columns.append(
                 of_trials([part if trial.pca == pca else None for part, trial in zip(by_shift, study, strict=True)])
             )
-    if (sd := sizes.get(Name.LENGTH_GAIN.value)) is not None:
+    if (sd := sizes.get(Name.LENGTH_GAIN)) is not None:
         columns.append(of_trials([(a - b) * sd / _GAIN for a, b in zip(forces(0.0, _GAIN), plain, strict=True)]))
-    if (sd := sizes.get(Name.RUN_DOWN.value)) is not None:
+    if (sd := sizes.get(Name.RUN_DOWN)) is not None:
         columns.append(of_trials([-i * sd * force for i, force in enumerate(plain)]))
-    if (sd := sizes.get(Name.TIME_SHIFT.value)) is not None:
+    if (sd := sizes.get(Name.TIME_SHIFT)) is not None:
         columns.append(of_trials([-sd * np.gradient(force, SAMPLE_S) for force in plain]))
     for i, force in enumerate(plain):
         for name, shape in (
             (Name.FORCE_OFFSET, np.ones(force.size)),
             (Name.FORCE_DRIFT, np.arange(force.size) * SAMPLE_S),
         ):
-            if (sd := sizes.get(name.value)) is not None:
+            if (sd := sizes.get(name)) is not None:
                 columns.append(of_trials([sd * shape if j == i else None for j in range(len(plain))]))
     return columns
