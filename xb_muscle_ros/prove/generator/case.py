@@ -17,7 +17,7 @@ from xb_muscle_ros.prove.generator.mix import Spec
 from xb_muscle_ros.prove.generator.noise import noise
 from xb_muscle_ros.prove.generator.study import Planned, plan
 from xb_muscle_ros.prove.generator.truth import Truth, study_forces, trial_force
-from xb_muscle_ros.prove.generator.world import Stimulus, World, isometric
+from xb_muscle_ros.prove.generator.world import Mesh, Stimulus, World, isometric
 from xb_muscle_ros.trials.trial import Array
 
 C = TypeVar("C", bound="Case")
@@ -150,9 +150,11 @@ def dressed(concealed: Sequence[Concealed], base: World) -> Truth:
     return truth
 
 
-def forces_of(concealed: Sequence[Concealed], base: World, stimuli: Sequence[Stimulus]) -> list[Array]:
+def forces_of(
+    concealed: Sequence[Concealed], base: World, stimuli: Sequence[Stimulus], mesh: Mesh | None = None
+) -> list[Array]:
     """Force of the fibre with its effects, F0, by trial."""
-    return study_forces(dressed(concealed, base), stimuli)
+    return study_forces(dressed(concealed, base), stimuli, mesh)
 
 
 def usable(study: Sequence[Planned], forces: Sequence[Array]) -> bool:

@@ -9,11 +9,13 @@ import re
 import textwrap
 import warnings
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from xb_muscle_ros.diagnose.component import Kind
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
 from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND
@@ -34,6 +36,13 @@ DOTS: tuple[dict[str, Any], ...] = (
     {"marker": "o", "color": MODEL, "linestyle": "none", "label": "answer"},
 )
 _DATA_LINE: dict[str, Any] = {"color": DATA, "linewidth": 1.8, "label": "measured", "solid_capstyle": "round"}
+KIND_LOOKS: Mapping[Kind, dict[str, Any]] = MappingProxyType(
+    {
+        Kind.MECHANISM: {"facecolor": MODEL, "edgecolor": MODEL},
+        Kind.ARTEFACT: {"facecolor": "white", "edgecolor": SECOND, "hatch": "/////"},
+    }
+)
+"""Areas of mechanisms and of artefacts, which are hatched."""
 _BINS = 450
 _NAME = 26
 _CLIP = re.compile(r"\bp[0-9a-f]{10}\b")
