@@ -34,9 +34,7 @@ def with_features(d: Diagnosis, study: Searched, table: FeatureTable, fitted: bo
     Relative SRS of a table that no fit has met is scored at the conditions of which no trace has the stretch.
 
     Args:
-        d: without them.
         study: fits of base and answer.
-        table: measured.
         fitted: whether the fits had to meet it; its test stretches of run-down fibres are predicted all the same.
     """
     rows: list[Feature] = []
@@ -131,7 +129,6 @@ def as_table(
     """Predictions of several fibres on the axes of a table; NaN where a fibre has no feature.
 
     Args:
-        label: of the table.
         like: whose axes are taken; every feature lies on them.
         features: of each fibre.
         values: what was predicted of them.
@@ -160,7 +157,6 @@ def relative_srs_rmsd(
 
     Args:
         model: see `as_table`.
-        data: measured.
         concealed: conditions (amplitude, recovery) that count; None for all 21.
 
     Returns:

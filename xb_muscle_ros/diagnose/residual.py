@@ -34,7 +34,6 @@ class ResidualLaw:
     """A Prony series in the length change that describes a residual and does not explain it.
 
     Attributes:
-        fibre: whose.
         time_constant_s: the dominant one.
         scales_with: ``constant``, ``activation``, ``calcium`` or ``force``.
         gain_f0_per_l0: of all exponentials together: force per length of a sudden change where what it scales with is

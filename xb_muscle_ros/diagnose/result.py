@@ -71,11 +71,9 @@ class NuisanceParameter:
     """An ordinary measurement artefact as estimated: a nuisance parameter of every model.
 
     Attributes:
-        fibre: whose.
         name, group: of the artefact; group: the solution or trial, empty for the whole study.
         unit: of value, sd and prior_sd.
         value: estimate with the answer's model.
-        sd: standard error.
         prior_sd: what is ordinary.
         before: estimate with the base; None where the base does not have it.
     """
@@ -121,9 +119,7 @@ class OfStudyFibre:
     """One fibre of the study as a whole.
 
     Attributes:
-        fibre: name.
         model: base set.
-        trials: how many.
         answer: names with probability of `NAMED` and more from this fibre alone.
         before, after: base, and the study's answer fitted to this fibre.
         left_out_rmsd_f0: this fibre predicted with effects as the other fibres have them, base and answer, F0; None
@@ -150,7 +146,6 @@ class Feature:
     """A tabulated feature, measured and predicted.
 
     Attributes:
-        fibre: whose.
         name: ``isometric force`` (F0) or ``SRS`` (F0/L0).
         condition: in words: pCa, amplitude, recovery.
         measured, before, after: value, by the base and by the answer.
@@ -208,11 +203,9 @@ class Diagnosis:
     """All that a diagnosis found.
 
     Attributes:
-        format_version: see `FORMAT`.
         fibres: in the order given.
         model, method: of the base.
         quick, seed, seconds: how it was made.
-        verdict: see `Verdict`.
         answer: mechanisms with an inclusion probability of `NAMED` or more, best first.
         components: all candidates, the most probable first.
         explained_fraction: of the mismatch by the answer.

@@ -33,9 +33,7 @@ def diagnose(
 
     Args:
         studies: fibres with their trials.
-        quick: look less hard.
         seed: of the bootstrap.
-        options: where work is done.
         features: table of measured SRS and isometric force to be met beside the traces.
         predict: such a table to be predicted, never fitted.
         error_sds: standard deviations of ordinary measurement errors that are not those of the table, by name.

@@ -32,12 +32,9 @@ class BaseFitted:
     """A study before its search: the base is fitted, and the Gaussian form's own error taken out.
 
     Attributes:
-        studies: as read.
         fibres: as the search starts from them: smoothing off, constants of the trials.
         recorded: all samples of each fibre.
         recordings: trials of each fibre with their noise.
-        explorer: all fits.
-        lines: warnings on the way.
     """
 
     studies: tuple[FibreStudy, ...]

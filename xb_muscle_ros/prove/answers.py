@@ -22,7 +22,6 @@ class Statement(NamedTuple):
 
     Attributes:
         name: of a mechanism or artefact, or of a family whose members are not separable.
-        family: whose it is.
         single: whether it is one name, and not a family of several.
         probability: that it is part of the truth; None in format 1, which has none for it.
     """
@@ -45,7 +44,6 @@ class Answer:
         confidence: of format 1.
         first_mismatch: trial and phase; None without mismatch.
         before_heldout_f0, after_heldout_f0: held-out RMSD of base and answer, F0; None where nothing was held out.
-        seconds: that the tool took.
     """
 
     verdict: str

@@ -27,7 +27,6 @@ class Score(NamedTuple):
 
     Attributes:
         value: None where no case counts.
-        n: cases that count.
         lower, upper: 95 % interval: Clopper–Pearson for shares, bootstrap for medians.
         bar: to reach; None where it has none.
         at_most: the bar is an upper one.

@@ -28,7 +28,6 @@ class Judged:
         physics: whether the tool says that physics is missing.
         gain: held-out gain over that of the true model; None unless before and after are known.
         worse: whether the answer predicts held-out conditions worse than the base; None where that is unknown.
-        seconds: that the tool took.
     """
 
     case: str
@@ -49,12 +48,10 @@ class JudgedSingle(Judged):
     """What became of a case with one effect, a pair or none.
 
     Attributes:
-        labels: what is concealed.
         size_f0: RMS that it leaves after a refit.
         size_class_f0: the highest of 0.5, 1, 2 and 4 % F0 that this reaches, else 0; None for nulls and artefacts.
         answer: first name that the tool gives, else its verdict.
         exact: the first name is right; for a pair either, for temperature and phosphate also ``parameters``, ``none``.
-        family: the first name is of a right family.
         located: the first mismatch is where the residual of a refit is at least half as large as anywhere; None
             without mismatch.
         located_beside_nuisances: the same with a refit of constants and nuisance parameters.
@@ -100,7 +97,6 @@ class JudgedComposite(Judged):
     """What became of a composite.
 
     Attributes:
-        trials: how many its study has.
         effects, outside, artefacts: what is concealed: mechanisms, effects without a name, errors of the measurement.
         named, artefacts_named: mechanisms of the answer, and artefacts that the tool names.
         statements, artefact_statements: all of either that it gives a probability.

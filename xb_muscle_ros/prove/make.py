@@ -47,7 +47,6 @@ def make(
 
     Args:
         out: folder; gets ``cases/`` and ``benchmark.json``.
-        cases: how many.
         seed: decides everything; who knows it knows the key.
         key: file for the truths; must not lie in `out`.
         method: how the fibre files say that heads are distributed over strain.

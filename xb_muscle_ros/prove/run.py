@@ -25,11 +25,7 @@ def run(folder: Path, out: Path, quick: bool, seed: int, options: Options, overw
     """Diagnose all cases; a run that was stopped goes on where it was.
 
     Args:
-        folder: of the benchmark.
         out: gets one folder of a diagnosis for each case, ``results.json`` and a copy of ``benchmark.json``.
-        quick: the tool's quick way.
-        seed: of the tool.
-        options: where to work.
         overwrite: replace the results of an older run; diagnoses that the journal keeps are not done again.
 
     Returns:

@@ -25,7 +25,7 @@ VISCO, LATTICE, SHIFT = Name.PASSIVE_VISCOELASTICITY, Name.LATTICE_SPACING, Name
 class ByHand(Explorer):
     """Effects are worth what their fits say, and nothing else."""
 
-    def adjusted(self, names: Names, fibres: Sequence[int] | None = None) -> float:
+    def adjusted(self, names: Names, fibres: Sequence[int]) -> float:
         """Nothing."""
         return 0.0
 

@@ -140,9 +140,9 @@ def test_effects_that_are_alike_in_fibres_are_worth_more(system: System, drag_fi
     assert set(rows) == {"drag"}
     assert [row.value for row in rows["drag"]] == [drag_fit.values["drag"]] * 2
     assert all(row.effect and row.prior_mean == 0.0 and row.prior_sd == 0.02 for row in rows["drag"])
-    assert e.adjusted((DRAG,)) == pytest.approx(adjustment(rows["drag"]))
+    assert e.adjusted((DRAG,), [0, 1]) == pytest.approx(adjustment(rows["drag"]))
     assert e.adjusted((DRAG,), [0]) == pytest.approx(adjustment(rows["drag"][:1]))
-    assert e.adjusted((DRAG,)) > 2.0 * e.adjusted((DRAG,), [0])
+    assert e.adjusted((DRAG,), [0, 1]) > 2.0 * e.adjusted((DRAG,), [0])
 
 
 def test_other_systems_start_where_the_former_fits_ended(

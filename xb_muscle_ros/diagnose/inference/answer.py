@@ -38,8 +38,6 @@ class Judged:
     """A study, searched and predicted.
 
     Attributes:
-        explorer: all fits.
-        heldout: predictions of left-out conditions.
         averages: over all fibres.
         of_fibres: of each fibre.
         without_fibres: of all fibres but each; empty where there is one.
@@ -226,7 +224,6 @@ def verdict_of(found: Sequence[Component], described: bool, detected: bool, fine
     """What the diagnosis says as a whole.
 
     Args:
-        found: all components.
         described: whether the base describes the recordings at all.
         detected: whether the base leaves more than noise and the practical floor.
         fine: whether the fibre file as given is as good as the base fitted anew.

@@ -25,11 +25,9 @@ class Residual(NamedTuple):
     """Measured minus simulated force of one trial.
 
     Attributes:
-        trial: name.
         pca: None where calcium changes.
         time_s: shape (n,), increasing, s.
         value_f0: shape (n,), measured minus simulated, F0.
-        phases: of the trial.
         length_l0: shape (n,), length change at these times, L0.
         calcium_um: shape (n,), µM.
     """
@@ -47,7 +45,6 @@ class Cell(NamedTuple):
     """Some samples of one trial.
 
     Attributes:
-        trial: name.
         phase: name of the phase; ``_early`` and ``_late`` are parts of it, a number tells the second from the first.
         start_s, end_s: time of the first sample and of the last.
         begin, end: samples, counted through all trials, `end` not included.
@@ -189,7 +186,6 @@ def exceeding(time_s: Array, value_f0: Array, threshold_f0: float) -> tuple[floa
 
     Args:
         time_s, value_f0: of one cell, shape (n,).
-        threshold_f0: F0.
     """
     width = max(value_f0.size // 8, 1)
     counts = np.convolve(np.ones(value_f0.size), np.ones(width), "same")

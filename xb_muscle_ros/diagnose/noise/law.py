@@ -55,7 +55,6 @@ def law(
     scale with; the best in cross-validation over trials counts.
 
     Args:
-        fibre: whose.
         residuals: of all trials, after the fit.
         fit: its normal equations, samples in the order of the residuals.
         scalings: by name, for each trial: activation, calcium (0 to 1, saturating), force ... at the residual's times.

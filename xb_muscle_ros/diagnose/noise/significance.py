@@ -49,7 +49,6 @@ class Significance:
         overall_rms_f0: over all samples of all trials.
         overall_null_f0: what noise reaches of that in 95 of 100 draws.
         overall_p: chance that noise makes some cell, or the whole, stand out as much.
-        practical_f0: the practical floor.
     """
 
     residuals: tuple[Residual, ...]
@@ -143,8 +142,6 @@ def significance(
         fit: its normal equations, samples in the order of the residuals.
         noise: of the trials; others may be among them.
         draws: of noise; no p-value is below 2/(draws + 1).
-        seed: of the draws.
-        floor_f0: the practical floor, F0.
 
     Raises:
         UserError: residuals that cannot be looked at, samples that are not those of the fit, a trial of unknown noise.

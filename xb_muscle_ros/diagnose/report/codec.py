@@ -49,7 +49,6 @@ def from_json(row: object, where: str = "diagnosis.json") -> Diagnosis:
     be.
 
     Args:
-        row: as read.
         where: the file, for messages.
 
     Raises:
@@ -72,7 +71,6 @@ def renamed(value: Any, names: Mapping[str, str], plain: Collection[str] = ()) -
     """What a file of a former format holds, under the keys of the present one.
 
     Args:
-        value: plain data.
         names: present keys by former ones.
         plain: keys whose values have keys that are no fields.
     """

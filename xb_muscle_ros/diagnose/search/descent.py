@@ -31,13 +31,11 @@ class Fit:
     """The best point found of a set in one fibre.
 
     Attributes:
-        names: of the set.
         values: of all coordinates by label, in their units.
         mean_square_f0: of the residuals, weighted, F0².
         prior: half the squared distance from the priors and from features, in standard deviations.
         occam: half the logarithm of how many times narrower the posterior is than the priors (Laplace).
         sds: posterior standard deviation of every coordinate by label, on the moved scale (logarithms where fitted so).
-        rmsd_f0: root of `mean_square_f0`, F0.
         simulated: simulations of all trials that it took.
     """
 
@@ -73,7 +71,6 @@ class Point:
     """A point of a problem with its residuals.
 
     Attributes:
-        z: on the moved scale.
         residual: simulated less measured force, F0.
         mean_square: weighted, F0².
         prior, feature: distances from the priors and from the features, in standard deviations.
@@ -156,7 +153,6 @@ class Descent:
 
         Args:
             z: start on the moved scale.
-            most: Jacobians at most.
             tolerance: fall of the cost at which to stop, in its own unit.
             slopes: at the start, where they are known.
 

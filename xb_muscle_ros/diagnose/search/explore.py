@@ -118,13 +118,12 @@ class Explorer:
             self._estimates[names] = found
         return self._estimates[names]
 
-    def adjusted(self, names: Names, fibres: Sequence[int] | None = None) -> float:
-        """What it adds to the evidence that effects are mostly small, and alike in all fibres."""
-        chosen = tuple(range(len(self.systems)) if fibres is None else fibres)
-        key = names, chosen
+    def adjusted(self, names: Names, fibres: Sequence[int]) -> float:
+        """What it adds to the evidence that effects are mostly small, and alike in these fibres."""
+        key = names, tuple(fibres)
         if key not in self._adjusted:
             rows = self.estimates(names).values()
-            self._adjusted[key] = sum(adjustment([row[i] for i in chosen]) for row in rows)
+            self._adjusted[key] = sum(adjustment([row[i] for i in fibres]) for row in rows)
         return self._adjusted[key]
 
     @staticmethod

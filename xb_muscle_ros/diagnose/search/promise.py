@@ -27,7 +27,6 @@ class Promise(NamedTuple):
     """Of one candidate in one fibre.
 
     Attributes:
-        name: of it.
         gain: fall of the cost along its line, profiled over all else; nan where only a fit can tell.
         starts: values by label from which its fit may start.
         mean_square_f0: of the residuals there, F0²; nan where only a fit can tell.

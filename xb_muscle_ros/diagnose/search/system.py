@@ -116,7 +116,6 @@ class System:
         """The fit of a set.
 
         Args:
-            names: of the set.
             values: by label of coordinate, for those that are not to start as the fibre or the catalogue says; those
                 of mechanisms that are not in the set are left alone.
         """

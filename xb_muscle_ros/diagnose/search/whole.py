@@ -55,7 +55,6 @@ def whole(fibre: Fibre, frame: Sequence[Name]) -> Fibre:
 
     Args:
         fibre: as given; its own mechanisms stay.
-        frame: see `FRAMES`.
 
     Raises:
         UserError: a frame that does not go with the model.
@@ -82,7 +81,6 @@ def only(fibre: Fibre, given: Fibre, names: Sequence[Name]) -> Fibre:
 
     Args:
         fibre: whole, with fitted values.
-        given: the fibre as it was given.
         names: mechanisms that are there.
     """
     model = with_mechanisms(given.model, *names)

@@ -55,12 +55,10 @@ class Case:
     """A finished case.
 
     Attributes:
-        spec: what it was to be.
         fibre, nominal: as in `Drawn`.
         values: the true constants.
         study: planned trials in the order of recording.
         concealed: effects, in the order of the spec.
-        artefacts: of the measurement.
         recorded: force as recorded, F0, noise and all, by trial.
         noise_sd: of each trial, F0.
         before: RMS difference to the base with the true constants, F0.

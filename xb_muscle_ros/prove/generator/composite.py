@@ -26,7 +26,6 @@ class Composite(Case):
 
     Attributes:
         sizes: unique contribution of each effect, F0.
-        ordinary: artefacts that are ordinary.
         artefact_residual: RMS residual of artefacts beyond the ordinary, F0, and the largest prior residual of an
             ordinary one that they cause, in its SDs; None where there are none.
     """

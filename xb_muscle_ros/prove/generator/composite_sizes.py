@@ -138,7 +138,6 @@ class Sized:
         """What each effect leaves if the model has all others, and all that the model has is fitted again, F0.
 
         Args:
-            concealed: all effects.
             anew: how often refits may take their slopes anew.
         """
         data = self._force(concealed)
@@ -209,7 +208,6 @@ class _Slopes(NamedTuple):
     """Change of all forces, F0, by one prior SD of each coordinate.
 
     Attributes:
-        refit: of constants.
         columns: constants, logarithms of the effects' scales, ordinary artefacts; shape (samples, coordinates).
         constants: how many there are.
     """

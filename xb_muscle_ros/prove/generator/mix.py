@@ -35,8 +35,6 @@ class Part(NamedTuple):
     Attributes:
         kind: ``null``: ordinary artefacts only; ``artefact``: artefacts beyond them; ``composite``: mechanisms;
             ``outside``: an effect that has no name, perhaps beside a mechanism.
-        share: of all cases.
-        mechanisms, artefacts: how many.
     """
 
     kind: str
@@ -67,7 +65,6 @@ class Spec(NamedTuple):
         sizes: of a single, the RMS that all leave after a refit; of a composite, the unique contribution of each, F0.
         model: that the tool is given.
         artefacts: of the measurement, of different families.
-        trials: of the study.
     """
 
     kind: str

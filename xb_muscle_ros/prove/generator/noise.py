@@ -15,7 +15,6 @@ def noise(random: np.random.Generator, n: int, share: float) -> tuple[Array, flo
     """Slow noise, with hum where force is high.
 
     Args:
-        random: decides.
         n: number of samples, 1 ms apart.
         share: isometric force relative to that at pCa 4.5.
 

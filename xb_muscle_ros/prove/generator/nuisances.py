@@ -49,7 +49,6 @@ def artefact_columns(
 
     Args:
         forces: of every trial, F0, where pCa is so much higher and length changes are so much larger.
-        study: planned trials.
         plain: forces without artefacts.
         sizes: SD by name of the artefact: pCa of each solution, length gain, run-down, delay, offset and drift of each
             trial. Those that are not named are left out.

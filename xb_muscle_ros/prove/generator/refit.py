@@ -30,7 +30,6 @@ class Refitted(NamedTuple):
     Attributes:
         rms: of the residual over all samples, F0.
         residual: data minus base, F0, by trial.
-        values: of the fitted constants.
         at: where these lie: changes of their logarithms, and of the parallel spring.
     """
 
@@ -54,10 +53,8 @@ class Refit:
         """Take the Jacobian at the true constants of the plain world that the tool is given.
 
         Args:
-            base: that world.
             study: stated calcium and recorded length of every trial.
             dress: puts on it the effects that the model has as well.
-            mesh: resolution.
         """
         self._base, self._study, self._dress, self._mesh = base, list(study), dress, mesh
         self.names = tuple(name for name in _FITTED if name in base.values)

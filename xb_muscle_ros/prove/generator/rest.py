@@ -45,7 +45,6 @@ class Rest:
 
         Args:
             columns: shape (samples of all trials, coordinates), F0.
-            trials: how many there are.
         """
         self._columns = columns
         self._weight = np.sqrt(WORTH * trials / self._columns.shape[0]) / WORTH_SD

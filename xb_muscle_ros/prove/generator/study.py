@@ -48,7 +48,6 @@ def plan(
     """Trials: relaxed, fully active and at three or more levels between; stretches, ramps and a release.
 
     Args:
-        random: decides.
         force_of: isometric force at a pCa, F0.
         gentle: slower and smaller, for a fibre without series spring.
         trials: how many, at least `TRIALS`; the more there are, the more levels of calcium.

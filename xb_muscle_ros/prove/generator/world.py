@@ -160,7 +160,6 @@ def simulate(
     """A trial, from isometric steady state.
 
     Args:
-        world: the fibre.
         stimulus: length linear between samples 1 ms apart.
         acting: see there; None for a fibre without such effects.
         mesh: resolution; None for the usual one.
