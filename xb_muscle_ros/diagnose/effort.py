@@ -16,7 +16,6 @@ class Effort:
         most: Jacobians of a fit.
         tolerance: fall of the cost at which a fit stops.
         folds: groups of trials left out in turn, at most.
-        draws: of the bootstrap.
     """
 
     steps: int = 6

@@ -93,7 +93,6 @@ class OfTrial:
     """One trial before and after.
 
     Attributes:
-        fibre, trial, pca: which.
         phases: name, start and end in s.
         noise_sd_f0, noise_source, noise_samples: of its force; `noise_source` as in `scores.noise.model.Source`.
         before_rmsd_f0, after_rmsd_f0: base and answer, fitted to all trials.
@@ -119,7 +118,6 @@ class OfStudyFibre:
     """One fibre of the study as a whole.
 
     Attributes:
-        model: base set.
         answer: names with probability of `NAMED` and more from this fibre alone.
         before, after: base, and the study's answer fitted to this fibre.
         left_out_rmsd_f0: this fibre predicted with effects as the other fibres have them, base and answer, F0; None
@@ -170,7 +168,6 @@ class FeatureScore:
     Attributes:
         reading: of docs/evaluate.md: ``text`` or ``released``.
         conditions: set of conditions: ``large``, ``small`` or ``all`` reductions of SRS.
-        count: how many conditions were compared.
         before, after: by base and answer.
     """
 

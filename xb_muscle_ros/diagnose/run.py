@@ -32,8 +32,6 @@ def diagnose(
     """Diagnose a study of one fibre or of several.
 
     Args:
-        studies: fibres with their trials.
-        seed: of the bootstrap.
         features: table of measured SRS and isometric force to be met beside the traces.
         predict: such a table to be predicted, never fitted.
         error_sds: standard deviations of ordinary measurement errors that are not those of the table, by name.

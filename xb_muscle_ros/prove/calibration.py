@@ -27,9 +27,6 @@ class Stated(NamedTuple):
 def error(cases: Sequence[Sequence[Stated]]) -> float | None:
     """Expected calibration error: mean over all statements of |mean probability - share right| of their bins.
 
-    Args:
-        cases: the statements of every case.
-
     Returns:
         None where there is no statement.
     """

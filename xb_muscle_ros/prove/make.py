@@ -52,7 +52,6 @@ def make(
         method: how the fibre files say that heads are distributed over strain.
         options: where to work; the journal is kept beside the key until all is done.
         overwrite: replace another benchmark and its key.
-        kind: one of `sealing.KINDS`.
 
     Returns:
         SHA-256 of the key file.

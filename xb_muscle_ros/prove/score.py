@@ -34,7 +34,6 @@ def score(results: Path, key: Path, out: Path, overwrite: bool = False) -> tuple
         results: folder with ``results.json`` and ``benchmark.json``.
         key: its hash must be the one of ``benchmark.json``.
         out: gets ``scores.json``, ``scores.md`` and figures.
-        overwrite: replace older scores.
 
     Returns:
         The table in words, and the files.

@@ -81,7 +81,6 @@ def only(fibre: Fibre, given: Fibre, names: Sequence[Name]) -> Fibre:
 
     Args:
         fibre: whole, with fitted values.
-        names: mechanisms that are there.
     """
     model = with_mechanisms(given.model, *names)
     needed = [row.name for row in compose(model, given.method).parameters]
