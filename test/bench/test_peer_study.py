@@ -94,7 +94,7 @@ def test_the_table_says_what_was_fitted_and_what_is_not_known() -> None:
                   {"large": 1.0, "small": None, "all": 1.0}, 3.21, 0.012)  # fmt: skip
     costs = [Cost("made, by default", [0.010, 0.012, 0.020], 15.0, True), Cost("made", [0.03], 5e-4, False)]
     row = Row("x", "Muscle", "Package 1", "elastic", "tendon strain at F0",
-              {"tendon_strain": 0.031, "vmax_l0_per_s": 10.0}, 2, score, costs)  # fmt: skip
+              {"tendon_strain": 0.031, "vmax_l0_per_s": 10.0}, {}, 2, score, costs)  # fmt: skip
     head, cells = table([row])
     found = dict(zip(head, cells[0], strict=True))
     assert found["parameters"] == "tendon strain 0.031, vmax 10 L0/s (2 at a bound)"

@@ -74,9 +74,10 @@ def measured(path: FilePath) -> tuple[SrsTable, list[ModelSet]]:
         UserError: there is none.
     """
     data = read_table(path, "measured")
-    known = {file.stem for file in all_fibre_files()}
-    models = gather([name for name in data.fibres if name in known], MODELS, None)
-    fibres = [name for name in data.fibres if all(name in each.fibres for each in models)]
+    files = {file.stem for file in all_fibre_files()}
+    known = [name for name in data.fibres if name in files]
+    models = gather(known, MODELS, None) if known else []
+    fibres = [name for name in known if all(name in each.fibres for each in models)]
     if not fibres:
         raise UserError(
             f"{path}: none of the fibres {', '.join(data.fibres)} has a file with the sets {', '.join(MODELS)}"
@@ -149,7 +150,7 @@ def _own_row(models: ModelSet, score: Score, costs: Sequence[Cost]) -> Row:
     how = "its SRS and force, here" if fibre.source.startswith(_FITTED_HERE) else "its force, by the paper's authors"
     return Row(
         models.name, models.title, "xb_muscle_ros", "elastic" if "kse" in fibre.values else "none",
-        f"{models.fitted_parameters} parameters to {how}", {}, 0, score, costs,
+        f"{models.fitted_parameters} parameters to {how}", {}, {}, 0, score, costs,
     )  # fmt: skip
 
 

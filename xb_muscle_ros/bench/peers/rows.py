@@ -24,6 +24,7 @@ class Row:
         tendon: its series element: ``none``, ``rigid`` or ``elastic``.
         fitted: what was fitted of it to each fibre, and to what.
         values: median of fitted or default parameters over fibres.
+        of_fibres: the fitted ones by fibre.
         at_bounds: fitted values that ended at a bound, over all fibres.
         score: beside the measurement.
         costs: of one trial; the default first.
@@ -35,6 +36,7 @@ class Row:
     tendon: str
     fitted: str
     values: Mapping[str, float]
+    of_fibres: Mapping[str, Mapping[str, float]]
     at_bounds: int
     score: Score
     costs: Sequence[Cost]
@@ -60,7 +62,7 @@ def peer_row(
     bounds = sum(len(at_bound(peer, values)) for values in fitted.values())
     what = f"{peer.fitted} to its unconditioned SRS" if peer.free else "nothing"
     values = {**peer.defaults, **medians}
-    return Row(peer.key, peer.title, package, peer.tendon, what, values, bounds, score, costs)
+    return Row(peer.key, peer.title, package, peer.tendon, what, values, fitted, bounds, score, costs)
 
 
 def milliseconds(cost: Cost) -> float:
