@@ -124,6 +124,9 @@ def compare(
         for peer, package in peers:
             found = simulate(peer, data, fibres, progress.update)
             tables[peer.key] = found.table
+            if found.problems:
+                line = f"{peer.key}: {len(found.problems)} trials are left out; {found.problems[0]}"
+                Progress.write(f"xb_muscle: {line}", sys.stderr)
             costs = _cost(peer.take(found.values[timed]), data, timed)
             rows.append(peer_row(peer, package, found.values, score_of(found.table, data), costs))
         for each in models:

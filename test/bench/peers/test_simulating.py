@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 from made_muscles import Forgetful, Spring, peer
 
+from xb_muscle_ros.bench.peers.conditions import Path
 from xb_muscle_ros.bench.peers.muscle import Free
 from xb_muscle_ros.bench.peers.scoring import mean_srs, score_of
 from xb_muscle_ros.bench.peers.simulating import simulate
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.evaluate.srs_table import SrsTable
 from xb_muscle_ros.scores.conditions import CONDITIONS
+from xb_muscle_ros.trials.trial import Array
 
 STIFFNESS = Free("stiffness", "stiffness", 1.0, 200.0)
 
@@ -60,3 +63,19 @@ def test_every_condition_is_sent_once_at_each_pca_that_was_measured(measured: Sr
     assert [len(muscle.sent) for muscle in made] == [3 * len(CONDITIONS)]
     assert np.isnan(table.fibres["a"].test[1]).all()
     assert np.isfinite(table.fibres["a"].test[[0, 2, 3]]).all()
+
+
+def test_a_trial_that_cannot_be_integrated_is_left_out_and_told(measured: SrsTable) -> None:
+    """Its condition has no value; all others have theirs."""
+
+    class Failing(Spring):
+        def force_f0(self, activation: float, path: Path) -> Array:
+            if path.corner_l0.max() > 0.03:
+                raise UserError("made failure")
+            return super().force_f0(activation, path)
+
+    found = simulate(peer(Failing), measured, ["a"])
+    assert len(found.problems) == 4 * 5
+    assert found.problems[0] == "fibre a, pCa 4.5, amplitude 0.0383 L0, recovery 0.001 s: made failure"
+    assert np.isnan(found.table.fibres["a"].test[:, :, -1]).all()
+    assert np.isfinite(found.table.fibres["a"].test[:, :, :-1]).all()

@@ -17,6 +17,8 @@ from xb_muscle_ros.trials.trial import Array
 # The reference trial: nothing goes before its test stretch.
 _UNCONDITIONED = path_of(CONDITIONS[0])
 _SMALL_F0 = 1e-7
+# Starts of a fit as shares of the way between the bounds, as many as there are parameters.
+_STARTS = (0.6, 0.3)
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,7 @@ def fitted(peer: Peer, target: Target) -> dict[str, float]:
 
     bounds = np.log([[free.lower for free in peer.free], [free.upper for free in peer.free]])
     best, problem = None, ""
-    for share in (0.3, 0.6):
+    for share in _STARTS[: len(peer.free)]:
         start = bounds[0] + share * (bounds[1] - bounds[0])
         try:
             # The stubs name a module so.

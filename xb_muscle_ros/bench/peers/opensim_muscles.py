@@ -24,7 +24,7 @@ PYTHON_VARIABLE = "XB_MUSCLE_PEERS_PYTHON"
 PROGRAM = FilePath(__file__).with_name("opensim_program.py")
 SLACK_L0 = 1.0
 """Slack length of the tendon, L0. What matters of an elastic tendon is its slack length times its strain."""
-SRS_ACCURACY = 1e-9
+SRS_ACCURACY = 1e-8
 """Of Manager's integrator in the trials that SRS are read off."""
 _REFERENCE_ACCURACY = 1e-10
 _ACCURACIES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)

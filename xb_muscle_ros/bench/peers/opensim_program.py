@@ -21,6 +21,8 @@ from typing import Any
 import opensim as osim
 
 _BODY_KG = 1e12
+# Of a muscle that has no least activation of its own: at 0 its force-velocity relation cannot be inverted.
+_LEAST_ACTIVATION = 1e-3
 _STRAINS: dict[str, tuple[Callable[[Any], float], Callable[[Any, float], None]]] = {
     "Millard2012EquilibriumMuscle": (
         lambda muscle: muscle.get_TendonForceLengthCurve().get_strain_at_one_norm_force(),
@@ -158,7 +160,7 @@ class Program:
         """Take a muscle; gives the least activation that it has, and its parameters."""
         self._request, self._bench = request, Bench(request)
         muscle = self._bench.muscle
-        least = muscle.get_minimum_activation() if hasattr(muscle, "get_minimum_activation") else 0.0
+        least = muscle.get_minimum_activation() if hasattr(muscle, "get_minimum_activation") else _LEAST_ACTIVATION
         values = {
             "tendon_strain": float(_STRAINS[request["kind"]][0](muscle)),
             "vmax_l0_per_s": float(muscle.get_max_contraction_velocity()),

@@ -10,7 +10,7 @@ import numpy as np
 from xb_muscle_ros.bench.peers.conditions import onset_stiffness, path_of
 from xb_muscle_ros.bench.peers.matching import Target, activations, fitted
 from xb_muscle_ros.bench.peers.muscle import Peer, PeerMuscle
-from xb_muscle_ros.errors import naming
+from xb_muscle_ros.errors import UserError, naming
 from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable, place
 from xb_muscle_ros.scores.conditions import AMPLITUDES_L0, COMMON_AMPLITUDE_L0, CONDITIONS, RECOVERIES_S
 from xb_muscle_ros.trials.trial import Array
@@ -27,10 +27,12 @@ class Simulated(NamedTuple):
     Attributes:
         table: of all fibres.
         values: fitted parameters by fibre.
+        problems: one line for each trial that could not be integrated, and is left out.
     """
 
     table: SrsTable
     values: Mapping[str, Mapping[str, float]]
+    problems: Sequence[str]
 
 
 def target_of(data: SrsTable, fibre: str) -> Target:
@@ -48,31 +50,34 @@ def simulate(peer: Peer, data: SrsTable, fibres: Sequence[str], done: Callable[[
         done: called after each fibre.
 
     Raises:
-        UserError: a trial cannot be integrated; names peer, fibre, pCa and condition.
+        UserError: parameters cannot be fitted; names peer and fibre.
     """
     values, held = {}, {}
+    problems: list[str] = []
     for name in fibres:
         target = target_of(data, name)
         with naming(f"{peer.title}, fibre {name}"):
             values[name] = fitted(peer, target)
             muscle = peer.take(values[name])
-            held[name] = _fibre(muscle, activations(muscle, target), data.pca)
+            held[name] = _fibre(muscle, activations(muscle, target), data.pca, name, problems)
         done()
-    return Simulated(SrsTable(peer.title, data.pca, RECOVERIES, AMPLITUDES, held), values)
+    return Simulated(SrsTable(peer.title, data.pca, RECOVERIES, AMPLITUDES, held), values, problems)
 
 
-def _fibre(muscle: PeerMuscle, at: Array, pca: Array) -> FibreSrs:
+def _fibre(muscle: PeerMuscle, at: Array, pca: Array, name: str, problems: list[str]) -> FibreSrs:
     shape = (at.size, RECOVERIES.size, AMPLITUDES.size)
     test, conditioning, isometric = (np.full(shape, np.nan) for _ in range(3))
     for k in np.flatnonzero(np.isfinite(at)):
         activation = float(at[k])
         isometric[k] = muscle.isometric_f0(activation)
         for condition in CONDITIONS:
-            with naming(
-                f"pCa {pca[k]:g}, amplitude {condition.amplitude_l0:g} L0, recovery {condition.recovery_s:g} s"
-            ):
-                path = path_of(condition)
+            path = path_of(condition)
+            try:
                 srs = onset_stiffness(path, muscle.force_f0(activation, path))
+            except UserError as error:
+                where = f"amplitude {condition.amplitude_l0:g} L0, recovery {condition.recovery_s:g} s"
+                problems.append(f"fibre {name}, pCa {pca[k]:g}, {where}: {error}")
+                continue
             if condition.amplitude_l0 == 0.0:
                 # Without a stretch before it, recovery is more of the same rest; the common stretch is the same too.
                 test[k, :, 0] = srs
