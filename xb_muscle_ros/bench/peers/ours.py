@@ -14,6 +14,7 @@ from xb_muscle_ros.evaluate.sets import ModelSet
 from xb_muscle_ros.evaluate.srs_table import SrsTable
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.scores.conditions import AMPLITUDES_L0, RECOVERIES_S
+from xb_muscle_ros.work.plain import from_plain
 
 _DEFAULT, _REFERENCE = 1e-6, 1e-10
 _TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
@@ -29,7 +30,7 @@ def simulate(models: ModelSet, fibres: Sequence[str], done: Callable[[], None] =
     made = grid.tasks([of], recoveries_s=RECOVERIES_S, amplitudes_l0=(0.0, *AMPLITUDES_L0))
     found = []
     for k, task in enumerate(made):
-        found.append(grid.Cells.of_plain(grid.simulate(task)))
+        found.append(from_plain(grid.Cells, grid.simulate(task)))
         if (k + 1) % len(grid.PCAS) == 0:
             done()
     return grid.table(of.title, list(of.fibres.values()), made, found)

@@ -6,8 +6,7 @@ import numpy as np
 
 from xb_muscle_ros.evaluate.srs_scores import READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, place
-from xb_muscle_ros.scores.activation import CLASSES
-from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0, COMMON_CLASS, COMMON_RECOVERY_S
+from xb_muscle_ros.scores.conditions import CLASSES, COMMON_AMPLITUDE_L0, COMMON_CLASS, COMMON_RECOVERY_S
 from xb_muscle_ros.scores.relative import nanmean, nansd
 from xb_muscle_ros.trials.trial import Array
 
