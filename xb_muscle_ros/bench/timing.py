@@ -12,15 +12,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.bench.measured import START_S, Measured
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.node.client.link import Link
 from xb_muscle_ros.node.client.process import NodeProcess, private_domain
 from xb_muscle_ros.node.client.wires import Sender, reliable
-from xb_muscle_ros.node.rules import stamp_ns
+from xb_muscle_ros.node.joint_state import Joints
 from xb_muscle_ros.node.ticker import make_waiter
+from xb_muscle_ros.node.traffic import subscribe
 
 _INPUT_HZ = 500.0
 PLAIN = "xb_muscle_ros.bench.plain_timer"
@@ -154,7 +154,7 @@ class _Pinger:
         self._link = link
         node = link.node
         self._length, self._calcium = (Sender(node, f"muscle/{topic}", fibres) for topic in ("length", "calcium"))
-        self._inlet = node.create_subscription(JointState, "muscle/force", self._on_force, reliable())
+        self._inlet = subscribe(node, "muscle/force", self._on_force, reliable())
         self._count = max(len(fibres), 1)
         self._answered = (-1, 0)
 
@@ -207,9 +207,9 @@ class _Pinger:
             "rate_hz": count / seconds,
         }
 
-    def _on_force(self, message: JointState) -> None:
-        if len(message.effort) == self._count:
-            self._answered = (stamp_ns(message.header.stamp), time.monotonic_ns())
+    def _on_force(self, message: Joints) -> None:
+        if message.effort.size == self._count:
+            self._answered = (message.stamp_ns, time.monotonic_ns())
 
 
 class _Feeder:

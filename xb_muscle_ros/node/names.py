@@ -38,7 +38,7 @@ class Names:
         self._index = {name: i for i, name in enumerate(fibres)}
         self._all = np.arange(len(fibres))
         self._strangers: set[str] = set()
-        self._last: tuple[list[str], Places] = ([], Places(self._all, None, []))
+        self._last: tuple[tuple[str, ...], Places] = ((), Places(self._all, None, []))
 
     def places(self, names: Sequence[str], values: int, field: str) -> Places:
         """Which fibres the values of a message are of; of a name that comes twice the first counts.
@@ -55,10 +55,10 @@ class Names:
             detail = f"{values} values in {field} for {len(names)} names; send one per name"
             raise Refusal("wrong array size", detail)
         last, found = self._last
-        if names != last:
+        if names is not last and tuple(names) != last:
             found = self._find(names)
             # New names are news only once.
-            self._last = ([*names], found._replace(new=[]))
+            self._last = (tuple(names), found._replace(new=[]))
         return found
 
     def _find(self, names: Sequence[str]) -> Places:
