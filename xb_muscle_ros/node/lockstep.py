@@ -10,7 +10,7 @@ from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.node.names import Indices, front
-from xb_muscle_ros.node.plan import Divided, Plan, numbers
+from xb_muscle_ros.node.plan import Divided, Plan, States, numbers
 from xb_muscle_ros.node.rules import Counts, Refusal, Trouble, scale_of
 from xb_muscle_ros.node.status import Account, Log, Snapshot, Status, time_went_back
 from xb_muscle_ros.node.stepping import Emit, Flags, Floats, outputs, stopped, use_threads
@@ -183,41 +183,46 @@ class Lockstep:
                 return self._plan(timeline, stamp, values[divided.good], troubles)
         return None
 
-    def _stepped(self, plans: Sequence[tuple[Timeline, Plan]], troubles: list[Trouble]) -> tuple[Indices, Floats]:
+    def _stepped(self, plans: Sequence[tuple[Timeline, Plan]], troubles: list[Trouble]) -> tuple[Indices, States]:
         """Fibres that came to the ends of their plans, ascending, and their states there; others go to the troubles."""
         together = self._together(plans)
         if together is not None:
             for timeline, plan in plans:
                 timeline.commit(plan, together if len(plans) == 1 else together[timeline.places])
             return self._every, together
-        done: list[int] = []
-        states: list[Floats] = []
-        for timeline, plan in plans:
-            stepped = self._one_by_one(timeline, plan, troubles)
-            done += stepped
-            states += stepped.values()
+        parts = [self._one_by_one(timeline, plan, troubles) for timeline, plan in plans]
+        if len(parts) == 1:
+            return parts[0]
+        done = np.concatenate([fibres for fibres, _ in parts]) if parts else np.empty(0, dtype=np.intp)
         order = np.argsort(done)
-        return np.array(done, dtype=np.intp)[order], np.array(states)[order] if done else np.empty((0, 0))
+        return done[order], np.array([state for _, states in parts for state in states])[order]
 
-    def _one_by_one(self, timeline: Timeline, plan: Plan, troubles: list[Trouble]) -> dict[int, Floats]:
-        """States of a timeline's fibres at the end of its plan; those that fail have one of their own from now on."""
-        stepped: dict[int, Floats] = {}
+    def _one_by_one(self, timeline: Timeline, plan: Plan, troubles: list[Trouble]) -> tuple[Indices, States]:
+        """Fibres of a timeline that came to the end of its plan, and their states there.
+
+        Those that fail go to the troubles, and have a timeline of their own from now on.
+        """
+        states = []
         failed: dict[int, UserError] = {}
         for k, i in enumerate(timeline.fibres):
             try:
-                stepped[i] = plan.step(self.batch, timeline.fibres, k)
+                states.append(plan.step(self.batch, i, k))
             except UserError as error:
                 self._violations += isinstance(error, StateViolation)
                 failed[i] = error
+        if not failed:
+            timeline.commit(plan, states)
+            return timeline.places, states
+        done = np.array([i for i in timeline.fibres if i not in failed], dtype=np.intp)
         for i, error in failed.items():
             one = timeline
             if len(timeline.fibres) > 1:
                 stay = timeline.places != i
                 one, plan = self._part(timeline, stay), plan.picked(np.flatnonzero(stay))
             troubles.append(Trouble(i, one.failed(plan, error)))
-        if stepped:
-            timeline.commit(plan, np.array(list(stepped.values())))
-        return stepped
+        if states:
+            timeline.commit(plan, states)
+        return done, states
 
     def _together(self, plans: Sequence[tuple[Timeline, Plan]]) -> Floats | None:
         """States of all fibres at the ends of their plans; None where they cannot, or one need not, go in one call."""
@@ -230,6 +235,7 @@ class Lockstep:
         if len(plans) == 1:
             states, change, calcium = plans[0][1].states, plans[0][1].change_l0, plans[0][1].calcium_um
             assert states is not None
+            states = np.asarray(states)
         else:
             change, calcium = np.empty((2, count))
             states = np.empty((count, len(self.batch.state_names)))

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numba import njit
 
 from xb_muscle_ros.models.muscle import Outputs
 from xb_muscle_ros.models.registry import PUSHES_F0
@@ -41,6 +42,10 @@ class OutputMessages:
         self._all = self._made(self._names)
         # Those who come in part mostly come in the same part.
         self._part = b"", self._all
+        # The first message shall not wait for a compiler.
+        force, _ = self._all
+        size = len(self._names)
+        _fill(np.zeros((size, len(Outputs._fields))), np.zeros((size, 2)), force.position, force.velocity, force.effort)
 
     def publish(self, stamp_ns: int, which: Indices | None, outputs: Floats, scales: Floats) -> None:
         """Send the outputs of one moment.
@@ -52,13 +57,10 @@ class OutputMessages:
             scales: shape (fibres, 2), one L0 (m) and one F0 (N).
         """
         force, moments = self._all if which is None else self._of(which)
-        np.multiply(outputs[:, _FORCE], scales[:, 1], out=force.effort)
-        np.multiply(scales[:, 0], 1.0 + outputs[:, _CE_LENGTH], out=force.position)
-        np.multiply(scales[:, 0], outputs[:, _CE_VELOCITY], out=force.velocity)
+        weakest, least = _fill(outputs, scales, force.position, force.velocity, force.effort)
         force.publish(stamp_ns)
-        least = outputs[:, _FORCE].min()
         if least < PUSHES_F0 and (self.pushed is None or least < self.pushed[1]):
-            self.pushed = force.names[int(outputs[:, _FORCE].argmin())], float(least)
+            self.pushed = force.names[weakest], least
         # Publishing is the dearest part of a tick; nobody misses what nobody listens to.
         if self._to_moments.get_subscription_count():
             moments.position[:] = outputs[:, _MOMENTS].ravel()
@@ -76,3 +78,17 @@ class OutputMessages:
             Outlet(self._to_force, names, len(names), FIELDS, self._bytes),
             Outlet(self._to_moments, moments, len(moments), FIELDS[:1], self._bytes),
         )
+
+
+@njit(cache=True)
+def _fill(outputs: Floats, scales: Floats, position: Floats, velocity: Floats, effort: Floats) -> tuple[int, float]:
+    """Put force and contractile elements into a message; returns who pulls least, and that force in F0."""
+    weakest = 0
+    for k in range(outputs.shape[0]):
+        reference_m, f0_n = scales[k]
+        effort[k] = f0_n * outputs[k, _FORCE]
+        position[k] = reference_m * (1.0 + outputs[k, _CE_LENGTH])
+        velocity[k] = reference_m * outputs[k, _CE_VELOCITY]
+        if outputs[k, _FORCE] < outputs[weakest, _FORCE]:
+            weakest = k
+    return weakest, outputs[weakest, _FORCE]

@@ -14,11 +14,18 @@ from xb_muscle_ros.node.stepping import Flags, Floats
 
 # Of one fibre a number, which costs less than an array of one; of many an array, shape (fibres,).
 Numbers = Any
+# Shape (fibres, n).
+States = Sequence[Floats] | Floats
 
 
 def numbers(values: Floats) -> Numbers:
     """Values, shape (fibres,), as a timeline takes them."""
     return float(values[0]) if values.size == 1 else values
+
+
+def number(values: Numbers, place: int) -> float:
+    """The value in a place."""
+    return values if isinstance(values, float) else float(values[place])
 
 
 class Divided(Exception):
@@ -49,23 +56,22 @@ class Plan(NamedTuple):
     asked: int
     change_l0: Numbers
     calcium_um: Numbers
-    states: Floats | None
+    states: States | None
     dt_s: float
 
     def picked(self, which: Indices) -> Plan:
         """The same for fibres in some places."""
         change, calcium = (numbers(np.atleast_1d(values)[which]) for values in (self.change_l0, self.calcium_um))
-        states = None if self.states is None else self.states[which]
+        states = None if self.states is None else np.asarray(self.states)[which]
         return self._replace(change_l0=change, calcium_um=calcium, states=states)
 
-    def step(self, batch: MuscleBatch, fibres: Sequence[int], place: int) -> Floats:
-        """State of the fibre in a place at its end, shape (n,).
+    def step(self, batch: MuscleBatch, fibre: int, place: int) -> Floats:
+        """State at its end, shape (n,), of a fibre of the batch that is in this place here.
 
         Raises:
             UserError, StateViolation: see `Muscle`.
         """
-        muscle = batch.muscles[fibres[place]]
-        change, calcium = (float(np.atleast_1d(values)[place]) for values in (self.change_l0, self.calcium_um))
+        muscle, change, calcium = batch.muscles[fibre], number(self.change_l0, place), number(self.calcium_um, place)
         if self.states is None:
             return muscle.settle(change, calcium)
         return muscle.step(self.states[place], change, calcium, self.dt_s)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from xb_muscle_ros.node.names import Indices, front
 from xb_muscle_ros.node.rules import (
@@ -50,10 +51,23 @@ class Inputs(NamedTuple):
 
     def carried_on(self, time_ns: int, limit_s: float) -> Floats:
         """Length changes carried on by their velocities, where there are any and they lead to what is allowed."""
-        ahead = np.minimum(np.maximum((time_ns - self.arrival_ns) * 1e-9, 0.0), limit_s)
-        change = self.change_l0 + self.velocity_l0_per_s * ahead
-        # Where the velocity would lead out of what is allowed, the sample itself is the better guess.
-        return np.where(inside(change, LENGTH_CHANGE_L0), change, self.change_l0)
+        carried: Floats = _carried_on(self.change_l0, self.velocity_l0_per_s, self.arrival_ns, time_ns, limit_s)
+        return carried
+
+
+@njit(cache=True)
+def _carried_on(
+    change_l0: Floats, velocity_l0_per_s: Floats, arrival_ns: Stamps, time_ns: int, limit_s: float
+) -> Floats:
+    """See `Inputs.carried_on`."""
+    carried = change_l0.copy()
+    for k in range(carried.size):
+        ahead_s = min(max((time_ns - arrival_ns[k]) * 1e-9, 0.0), limit_s)
+        change = change_l0[k] + velocity_l0_per_s[k] * ahead_s
+        # Where the velocity would lead out of what is allowed, or there is none, the sample is the better guess.
+        if LENGTH_CHANGE_L0[0] <= change <= LENGTH_CHANGE_L0[1]:
+            carried[k] = change
+    return carried
 
 
 class Samples:
@@ -88,6 +102,8 @@ class Samples:
         self._simulated_time = simulated_time
         self._length_stamps = np.full(count, NO_STAMP, dtype=np.int64)
         self._calcium_stamps = self._length_stamps.copy()
+        # The first tick shall not wait for a compiler.
+        self.inputs.carried_on(0, 0.0)
 
     def take_calcium(self, stamp: int, fibres: Indices, calcium_um: Floats) -> list[Trouble]:
         """Use calcium (µM) of some fibres from the next tick on; a stamp of 0 stands for an unstamped message."""

@@ -10,7 +10,7 @@ import numpy as np
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.node.calcium import KEPT, CalciumHistory
 from xb_muscle_ros.node.names import Indices
-from xb_muscle_ros.node.plan import Numbers, Plan, let_pass, numbers
+from xb_muscle_ros.node.plan import Numbers, Plan, States, let_pass, number, numbers
 from xb_muscle_ros.node.rules import (
     LENGTH_CHANGE_L0,
     NO_STAMP,
@@ -41,7 +41,7 @@ class Run:
     """
 
     scale: Floats
-    states: Floats | None = None
+    states: States | None = None
     # Stamp (ns) and length changes (L0) of the last length sample, and until when calcium was asked for, ns.
     stamp: int = NO_STAMP
     change: Numbers = 0.0
@@ -73,7 +73,7 @@ class Run:
         return replace(
             self,
             scale=self.scale[which],
-            states=None if self.states is None else self.states[which],
+            states=None if self.states is None else np.asarray(self.states)[which],
             change=pick(self.change) if self.stamp != NO_STAMP else 0.0,
             calcium=self.calcium.each(pick),
             coming=self.coming.each(pick),
@@ -146,7 +146,7 @@ class Timeline:
         run = self.run
         if run.fault or run.states is None:
             raise no_state(run.fault, "the first length sample")
-        calcium = run.calcium.each(lambda values: float(np.atleast_1d(values)[place]))
+        calcium = run.calcium.each(lambda values: number(values, place))
         scale = Scale(*run.scale[place].tolist())
         return Snapshot(run.states[place], scale, calcium.kept(), run.stamp, run.asked, run.account())
 
@@ -157,8 +157,8 @@ class Timeline:
         """
         first = snapshots[0]
         run = self.run = Run(np.array([snapshot.scale for snapshot in snapshots]))
-        run.states = np.stack([snapshot.state for snapshot in snapshots])
-        run.change = numbers(run.states[:, -3].copy())
+        states = run.states = np.stack([snapshot.state for snapshot in snapshots])
+        run.change = numbers(states[:, -3].copy())
         assert first.stamp is not None
         assert first.asked is not None
         run.stamp, run.asked = first.stamp, first.asked
@@ -223,7 +223,7 @@ class Timeline:
         let_pass(inside(velocity, VELOCITY_L0_PER_S), _too_fast, velocity)
         return Plan(stamp, asked, change, calcium, run.states, dt_s)
 
-    def commit(self, plan: Plan, states: Floats) -> None:
+    def commit(self, plan: Plan, states: States) -> None:
         """Take a plan's result up, shape (fibres, n)."""
         run = self.run
         run.states, run.stamp, run.change, run.asked = states, plan.stamp, plan.change_l0, plan.asked
