@@ -25,6 +25,7 @@ _STAMP = struct.Struct("<iI")
 _STAMP_AT = slice(_ORIGIN, _ORIGIN + _STAMP.size)
 _DOUBLE = np.dtype("<f8")
 _NONE: Floats = np.empty(0)
+_NONE.setflags(write=False)
 _SECOND_NS = 1_000_000_000
 
 
@@ -58,7 +59,11 @@ class Numbers(NamedTuple):
 
     def of(self, data: Any) -> Floats:
         """They themselves, in the data's own memory; they need not be aligned there."""
-        return np.frombuffer(data, _DOUBLE, self.size, self.begin) if self.size else _NONE
+        return np.frombuffer(data, _DOUBLE, self.size, self.begin)
+
+    def copied(self, data: bytes) -> Floats:
+        """A copy of them, aligned."""
+        return np.frombuffer(data, _DOUBLE, self.size, self.begin).copy() if self.size else _NONE
 
 
 class Layout(NamedTuple):

@@ -86,7 +86,7 @@ def as_bytes(log: Any = None) -> bool:
     if found in _MIDDLEWARE:
         return True
     if log is not None:
-        log.info(f"{found}: messages are read and written whole; that as bytes, faster, was tried with Fast DDS only")
+        log.info(f"{found}: messages are read and written whole; bytes, faster, were tried with Fast DDS only")
     return False
 
 
@@ -113,9 +113,9 @@ def set_stamp(message: JointState, stamp_ns: int) -> None:
 
 
 def _read(layout: Layout, data: bytes) -> Joints:
-    position, velocity, effort = layout.position.of(data), layout.velocity.of(data), layout.effort.of(data)
-    # A copy is aligned, and may be written to.
-    return Joints(layout.stamp_ns(data), layout.names, position.copy(), velocity.copy(), effort.copy())
+    position, velocity, effort = layout.position, layout.velocity, layout.effort
+    numbers = position.copied(data), velocity.copied(data), effort.copied(data)
+    return Joints(layout.stamp_ns(data), layout.names, *numbers)
 
 
 def _same(one: Joints, other: Joints) -> bool:
