@@ -110,7 +110,8 @@ class _Pinger:
         """Measure."""
         wait = make_waiter()
         self._period = period = round(1e9 * _TICK_S if rate_hz is None else 1e9 / rate_hz)
-        forces, took = [], []
+        forces: list[Array] = []
+        took: list[float] = []
         behind = 0
         begin = deadline = time.monotonic_ns()
         end = begin + round(duration_s * 1e9)

@@ -214,12 +214,12 @@ class Lockstep:
             timeline.commit(plan, states)
             return timeline.places, states
         done = np.array([i for i in timeline.fibres if i not in failed], dtype=np.intp)
-        for i, error in failed.items():
+        for i, why in failed.items():
             one = timeline
             if len(timeline.fibres) > 1:
                 stay = timeline.places != i
                 one, plan = self._part(timeline, stay), plan.picked(np.flatnonzero(stay))
-            troubles.append(Trouble(i, one.failed(plan, error)))
+            troubles.append(Trouble(i, one.failed(plan, why)))
         if states:
             timeline.commit(plan, states)
         return done, states

@@ -161,7 +161,8 @@ class MuscleNode(LifecycleNode):
             for topic in ("force", "moments")
         ]
         names = [fibre.name for fibre in fibres]
-        outlet = OutputMessages(names, *self._outlets, bytes_=as_bytes())
+        force, moments = self._outlets
+        outlet = OutputMessages(names, force, moments, as_bytes())
         self._stepping = stepping = self._made(fibres, outlet)
         self._inlet = inlet = Inlet(names, stepping, self.get_logger())
         self._listening = Listening(self, inlet, self._mode)

@@ -1,5 +1,7 @@
 """Force and moments of a muscle node's fibres as messages."""
 
+# mypy: allow-untyped-decorators
+
 from __future__ import annotations
 
 from collections.abc import Sequence

@@ -1,5 +1,7 @@
 """The newest samples of a realtime node's fibres: put in place by callbacks, read by the thread that ticks."""
 
+# mypy: allow-untyped-decorators
+
 from __future__ import annotations
 
 import time
