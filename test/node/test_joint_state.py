@@ -143,6 +143,24 @@ def test_names_stay_one_object_while_they_are_the_same(monkeypatch: pytest.Monke
     assert first.names == later[0].names
 
 
+def test_senders_that_take_turns_are_all_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Up to eight; of more the oldest is read whole again, and none is ever read wrongly."""
+    made: list[bytes] = []
+
+    def counted(data: bytes, kind: Any) -> Any:
+        made.append(data)
+        return deserialize_message(data, kind)
+
+    monkeypatch.setattr(traffic, "deserialize_message", counted)
+    reader = traffic.Reader()
+    for count, wholes in ((8, 8), (9, 1 + 4 * 9)):
+        made.clear()
+        for k in range(5 * count):
+            message = JointState(name=[f"fibre {k % count}"], position=[float(k)])
+            assert same(reader(serialize_message(message)), Joints.of(message))
+        assert len(made) == wholes
+
+
 @pytest.mark.parametrize("as_bytes", [True, False])
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(TEXTS, min_size=1, max_size=5), st.integers(1, 3), st.integers(0, 2**60))

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,7 +14,7 @@ from numba import njit
 from xb_muscle_ros.models.muscle import Outputs
 from xb_muscle_ros.models.registry import PUSHES_F0
 from xb_muscle_ros.node.joint_state import FIELDS
-from xb_muscle_ros.node.names import Indices
+from xb_muscle_ros.node.names import KINDS_KEPT, Indices
 from xb_muscle_ros.node.stepping import Floats
 from xb_muscle_ros.node.traffic import Outlet
 from xb_muscle_ros.trials.simulated import MOMENTS
@@ -42,8 +43,8 @@ class OutputMessages:
         self._to_moments = moments
         self._bytes = bytes_
         self._all = self._made(self._names)
-        # Those who come in part mostly come in the same part.
-        self._part = b"", self._all
+        # Those who come in part mostly come in the same parts.
+        self._part = functools.lru_cache(KINDS_KEPT)(self._made_of)
         # The first message shall not wait for a compiler.
         force, _ = self._all
         size = len(self._names)
@@ -58,7 +59,7 @@ class OutputMessages:
             outputs: shape (fibres, 11), a column for each name of `Outputs`.
             scales: shape (fibres, 2), one L0 (m) and one F0 (N).
         """
-        force, moments = self._all if which is None else self._of(which)
+        force, moments = self._all if which is None else self._part(which.tobytes())
         weakest, least = _fill(outputs, scales, force.position, force.velocity, force.effort)
         force.publish(stamp_ns)
         if least < PUSHES_F0 and (self.pushed is None or least < self.pushed[1]):
@@ -68,11 +69,8 @@ class OutputMessages:
             moments.position[:] = outputs[:, _MOMENTS].ravel()
             moments.publish(stamp_ns)
 
-    def _of(self, which: Indices) -> tuple[Outlet, Outlet]:
-        key = which.tobytes()
-        if self._part[0] != key:
-            self._part = key, self._made([self._names[i] for i in which.tolist()])
-        return self._part[1]
+    def _made_of(self, which: bytes) -> tuple[Outlet, Outlet]:
+        return self._made([self._names[i] for i in np.frombuffer(which, dtype=np.intp).tolist()])
 
     def _made(self, names: Sequence[str]) -> tuple[Outlet, Outlet]:
         moments = [f"{fibre}/{name}" for fibre in names for name in MOMENTS]

@@ -17,6 +17,7 @@ from rclpy.utilities import get_rmw_implementation_identifier
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.node.joint_state import FIELDS, Alike, Joints, Layout
+from xb_muscle_ros.node.names import KINDS_KEPT
 from xb_muscle_ros.node.stepping import Floats
 
 # Those for which bytes were tried.
@@ -24,22 +25,26 @@ _MIDDLEWARE = ("rmw_fastrtps_cpp",)
 
 
 class Reader:
-    """Reads serialized JointStates: whole where a message looks otherwise than the last, else only its numbers."""
+    """Reads serialized JointStates: of those that look like one of the last only the numbers, others whole."""
 
     def __init__(self) -> None:
-        self._layout: Layout | None = None
-        self._alike: Alike | None = None
+        # The newest first: mostly there is one sender, and its messages look all the same.
+        self._known: list[tuple[Layout, Alike]] = []
 
     def __call__(self, data: bytes) -> Joints:
         """What a message says."""
-        layout, alike = self._layout, self._alike
-        if layout is not None and alike is not None and alike(data):
-            return _read(layout, data)
+        known = self._known
+        for k, (layout, alike) in enumerate(known):
+            if alike(data):
+                if k:
+                    known.insert(0, known.pop(k))
+                return _read(layout, data)
         joints = Joints.of(deserialize_message(data, JointState))
-        layout = Layout.of(data)
+        found = Layout.of(data)
         # Only a layout that leads to what ROS has read is followed from now on.
-        if layout is not None and _same(_read(layout, data), joints):
-            self._layout, self._alike = layout, Alike(layout, data)
+        if found is not None and _same(_read(found, data), joints):
+            known.insert(0, (found, Alike(found, data)))
+            del known[KINDS_KEPT:]
         return joints
 
 
