@@ -60,12 +60,14 @@ class Rig:
                 self.stepping._done()
 
     def message(self, stamp_ns: int, names: list[str], position: list[float], velocity: list[float]) -> Any:
-        """A JointState."""
+        """What a JointState says."""
         from sensor_msgs.msg import JointState
+
+        from xb_muscle_ros.node.joint_state import Joints
 
         message = JointState(name=names, position=position, velocity=velocity)
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp_ns, SECOND)
-        return message
+        return Joints.of(message)
 
     def numbers(self) -> list[float]:
         """All outputs so far."""

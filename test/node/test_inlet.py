@@ -11,6 +11,7 @@ import pytest
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.node.inlet import Inlet
+from xb_muscle_ros.node.joint_state import Joints
 from xb_muscle_ros.node.rules import Refusal, Trouble
 
 FIBRES = ["left", "right", "back"]
@@ -18,7 +19,9 @@ FIBRES = ["left", "right", "back"]
 
 def message(position: Any, name: Any = (), velocity: Any = ()) -> Any:
     header = SimpleNamespace(stamp=SimpleNamespace(sec=1, nanosec=5))
-    return SimpleNamespace(header=header, name=list(name), position=list(position), velocity=list(velocity))
+    return Joints.of(
+        SimpleNamespace(header=header, name=list(name), position=list(position), velocity=list(velocity), effort=[])
+    )
 
 
 class Taken:

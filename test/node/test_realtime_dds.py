@@ -112,10 +112,23 @@ def test_node_and_plain_timer_are_measured_side_by_side(domain: int) -> None:
 @pytest.mark.slow
 def test_the_way_there_and_back_is_measured(domain: int) -> None:
     """With several fibres in each message."""
-    from xb_muscle_ros.bench.timing import run_roundtrip
+    from xb_muscle_ros.bench.roundtrip import run_roundtrip
 
     figures = run_roundtrip(3.0, 100.0, fibres=3)
     assert 50.0 < figures["p50_us"] <= figures["p99_us"] <= figures["p99.9_us"] <= figures["max_us"]
     assert figures["first_us"] > 0.0
     assert figures["last_us"] > 0.0
     assert 0.0 < figures["rate_hz"] < 101.0
+    assert figures["forces"] > 3 * 250
+    assert figures["unequal"] == 0
+
+
+@pytest.mark.slow
+def test_lockstep_is_measured_as_fast_as_it_answers(domain: int) -> None:
+    """With calcium in every tick, and its forces to the bit."""
+    from xb_muscle_ros.bench.roundtrip import run_roundtrip
+
+    figures = run_roundtrip(2.5, None, fibres=3, calcium_every=1)
+    assert figures["behind"] == 0
+    assert figures["forces"] == 3 * round(figures["forces"] / 3) > 0
+    assert figures["unequal"] == 0

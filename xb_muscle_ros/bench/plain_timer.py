@@ -24,6 +24,7 @@ from std_srvs.srv import Trigger
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Array, Muscle
 from xb_muscle_ros.node.inlet import Inlet
+from xb_muscle_ros.node.joint_state import Joints
 from xb_muscle_ros.node.lateness import Lateness, LatenessSummary
 from xb_muscle_ros.node.outputs import OutputMessages
 from xb_muscle_ros.node.reporter import Reporter
@@ -83,8 +84,8 @@ class PlainTimer(Node):
         self._emit = outlet.publish
         inlet = Inlet([fibre.name], self, self.get_logger())
         inlet.open = True
-        self.create_subscription(JointState, "muscle/calcium", inlet.take_calcium, newest)
-        self.create_subscription(JointState, "muscle/length", inlet.take_length, newest)
+        self.create_subscription(JointState, "muscle/calcium", lambda m: inlet.take_calcium(Joints.of(m)), newest)
+        self.create_subscription(JointState, "muscle/length", lambda m: inlet.take_length(Joints.of(m)), newest)
         self.counts = Counts()
         self._change: float | None = None
         self._calcium: float | None = None

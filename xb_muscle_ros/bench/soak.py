@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.bench.balance import Balance
 from xb_muscle_ros.bench.measure import Figure, Setting
@@ -22,8 +21,9 @@ from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.node.client.player import play_live
 from xb_muscle_ros.node.client.process import NodeProcess, private_domain
 from xb_muscle_ros.node.inlet import Inlet
+from xb_muscle_ros.node.joint_state import Joints
 from xb_muscle_ros.node.lockstep import Lockstep
-from xb_muscle_ros.node.outputs import OutputMessages, set_stamp
+from xb_muscle_ros.node.outputs import OutputMessages
 from xb_muscle_ros.progress import Progress
 from xb_muscle_ros.trials.trial import Trial, TrialFacts
 
@@ -180,13 +180,12 @@ def _publisher(keep: Callable[[Any], None]) -> Any:
 
 
 class _Message:
-    """A message as it would come out of DDS, filled again and again."""
+    """What messages as they come out of DDS say."""
 
     def __init__(self, fibre: str) -> None:
-        self._message = JointState(name=[fibre], position=[0.0])
+        self._names = (fibre,)
+        self._none = np.empty(0)
 
-    def filled(self, stamp_ns: int, value: float) -> JointState:
+    def filled(self, stamp_ns: int, value: float) -> Joints:
         """With a stamp (ns), and calcium (µM) or length (m)."""
-        set_stamp(self._message, stamp_ns)
-        self._message.position[0] = value
-        return self._message
+        return Joints(stamp_ns, self._names, np.array([value]), self._none, self._none)

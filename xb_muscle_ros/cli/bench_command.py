@@ -32,13 +32,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--duration", type=float, default=60.0, metavar="S", help="of node, roundtrip and many, s (default 60)"
     )
     node.add_argument(
-        "--rate", type=float, metavar="HZ", help="of these, Hz (default: node 1000, roundtrip and many 500)"
+        "--rate", type=float, metavar="HZ", help="of these, Hz (default: node and many 1000, roundtrip 500)"
     )
     node.add_argument(
         "--priority", type=int, default=0, metavar="P",
         help="realtime_priority of the node in node and many (default 0: ordinary)",
     )  # fmt: skip
-    node.add_argument("--fibers", type=int, default=100, metavar="N", help="of many (default 100)")
+    node.add_argument("--fibers", type=int, default=100, metavar="N", help="of roundtrip and many (default 100)")
     node.add_argument("--ticks", type=int, default=10_000_000, metavar="N", help="of soak (default 10 million)")
 
 

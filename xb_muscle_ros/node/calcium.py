@@ -1,8 +1,10 @@
-"""Calcium by stamp, as lockstep needs it."""
+"""Calcium by stamp, as lockstep needs it; a value is a number, or one for each of some fibres."""
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
+from typing import Any
 
 from xb_muscle_ros.node.rules import NO_STAMP
 
@@ -14,7 +16,7 @@ class CalciumHistory:
     """Calcium by stamp, held until the next one; keeps only what a later question can need."""
 
     def __init__(self) -> None:
-        self._kept: deque[tuple[int, float]] = deque(maxlen=KEPT)
+        self._kept: deque[tuple[int, Any]] = deque(maxlen=KEPT)
 
     @property
     def full(self) -> bool:
@@ -26,12 +28,12 @@ class CalciumHistory:
         """Stamp of the newest value, ns, or `NO_STAMP`."""
         return self._kept[-1][0] if self._kept else NO_STAMP
 
-    def add(self, stamp: int, calcium_um: float) -> None:
+    def add(self, stamp: int, calcium_um: Any) -> None:
         """Put a value (µM) that holds from `stamp` (ns) on in the place of all that held from then or later on."""
         self.cut(stamp)
         self._kept.append((stamp, calcium_um))
 
-    def at(self, stamp: int) -> float | None:
+    def at(self, stamp: int) -> Any:
         """Newest value (µM) with a stamp not after `stamp` (ns); None where there is none. Questions ascend in time."""
         kept = self._kept
         while len(kept) > 1 and kept[1][0] <= stamp:
@@ -43,6 +45,12 @@ class CalciumHistory:
         while self._kept and self._kept[-1][0] >= stamp:
             self._kept.pop()
 
-    def kept(self) -> tuple[tuple[int, float], ...]:
+    def kept(self) -> tuple[tuple[int, Any], ...]:
         """Stamps (ns) and values (µM) that later questions can need."""
         return tuple(self._kept)
+
+    def each(self, change: Callable[[Any], Any]) -> CalciumHistory:
+        """The same stamps with other values."""
+        made = CalciumHistory()
+        made._kept.extend((stamp, change(value)) for stamp, value in self._kept)
+        return made

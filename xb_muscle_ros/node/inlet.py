@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from xb_muscle_ros.node.joint_state import Joints
 from xb_muscle_ros.node.names import Indices, Names, Places, enumerated, front
-from xb_muscle_ros.node.rules import CALCIUM_UM, Counts, Refusal, Trouble, inside, outside, stamp_ns
+from xb_muscle_ros.node.rules import CALCIUM_UM, Counts, Refusal, Trouble, inside, outside
 from xb_muscle_ros.node.stepping import Floats, Stepping
 
 _WARN_EVERY_S = 5.0
@@ -66,14 +67,14 @@ class Inlet:
         self.refusing.clear()
         self._latched.clear()
 
-    def take_length(self, message: Any) -> None:
+    def take_length(self, message: Joints) -> None:
         """Callback of ``muscle/length``: position m, velocity m/s or none."""
         places = self._places("length", message) if self.open else None
         if places is None:
             return
         fibres, troubles = places.fibres, []
         positions, velocities = _chosen(message.position, places), None
-        if message.velocity:
+        if message.velocity.size:
             velocities = _chosen(message.velocity, places)
             finite = np.isfinite(velocities)
             if not finite.all():
@@ -81,13 +82,13 @@ class Inlet:
                     troubles.append(Trouble(int(fibres[k]), Refusal("not finite", f"velocity is {velocities[k]}")))
                 fibres, positions, velocities = fibres[finite], positions[finite], velocities[finite]
         if fibres.size:
-            troubles += self._taker.take_length(stamp_ns(message.header.stamp), fibres, positions, velocities)
+            troubles += self._taker.take_length(message.stamp_ns, fibres, positions, velocities)
         if len(troubles) < places.fibres.size:
             self.last_length_s = time.monotonic()
         if troubles or self.refusing:
             self._tell("length", places.fibres, troubles, troubles)
 
-    def take_calcium(self, message: Any, latched: bool = False) -> None:
+    def take_calcium(self, message: Joints, latched: bool = False) -> None:
         """Callback of ``muscle/calcium``: position µM; `latched` where a publisher kept it for who listens late."""
         places = self._places("calcium", message) if self.open else None
         if places is None:
@@ -100,7 +101,7 @@ class Inlet:
                 refusal = outside(float(values[k]), CALCIUM_UM, "calcium", "µM")
                 troubles.append(Trouble(int(fibres[k]), refusal))
             fibres, values = fibres[good], values[good]
-        stamp = stamp_ns(message.header.stamp)
+        stamp = message.stamp_ns
         if fibres.size:
             troubles += self._taker.take_calcium(stamp, fibres, values)
         # A stamp that is known only because two subscriptions bring the same is nothing to speak of.
@@ -111,18 +112,18 @@ class Inlet:
         if told or self.refusing:
             self._tell("calcium", places.fibres, troubles, told)
 
-    def _places(self, topic: str, message: Any) -> Places | None:
+    def _places(self, topic: str, message: Joints) -> Places | None:
         """Where the fibres of a message are; None where it has nothing for any of them, or is refused."""
         try:
-            places = self._names.places(message.name, len(message.position), "position")
+            places = self._names.places(message.names, message.position.size, "position")
             if places.new:
                 self.ignored_names += len(places.new)
                 here = f"fibre{'s' if len(self._fibres) > 1 else ''} {enumerated(self._fibres)}"
                 self._logger.warning(f"names ignored: {enumerated(places.new)}; this node has {here}")
             if not places.fibres.size:
                 return None
-            if topic == "length" and message.velocity and len(message.velocity) != len(message.position):
-                told = f"{len(message.velocity)} velocities for {len(message.position)} positions"
+            if topic == "length" and message.velocity.size not in (0, message.position.size):
+                told = f"{message.velocity.size} velocities for {message.position.size} positions"
                 raise Refusal("wrong array size", told)
         except Refusal as refusal:
             self._refuse(topic, refusal, [])
@@ -167,7 +168,6 @@ class Inlet:
             self._logger.warning(f"{topic}{of} refused ({reason}, {self.refused[reason]} so far): {refusal}")
 
 
-def _chosen(values: Any, places: Places) -> Floats:
+def _chosen(values: Floats, places: Places) -> Floats:
     """Values of a message in the order of the fibres found."""
-    array = np.array(values, dtype=np.float64)
-    return array if places.values is None else array[places.values]
+    return values if places.values is None else values[places.values]

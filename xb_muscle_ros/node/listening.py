@@ -13,8 +13,10 @@ from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.node.arrivals import Arrivals
 from xb_muscle_ros.node.inlet import Inlet
+from xb_muscle_ros.node.joint_state import Joints
 from xb_muscle_ros.node.latched import Latched
 from xb_muscle_ros.node.qos_overrides import POLICIES
+from xb_muscle_ros.node.traffic import as_bytes, hearing
 
 
 class Listening:
@@ -29,10 +31,11 @@ class Listening:
         self._node = node
         self._inlet = inlet
         self._mode = mode
-        self._latched: Latched | None = Latched(node, "muscle/calcium", lambda m: inlet.take_calcium(m, latched=True))
+        self._bytes = as_bytes(node.get_logger())
+        self._latched: Latched | None = Latched(node, "muscle/calcium", self._take_latched)
         self.arrivals = {
-            "calcium": Arrivals(inlet.take_calcium, self.look),
-            "length": Arrivals(inlet.take_length),
+            "calcium": Arrivals(hearing(inlet.take_calcium, self._bytes), self.look),
+            "length": Arrivals(hearing(inlet.take_length, self._bytes)),
         }
         # Calcium first: where both wait, it is then taken before the length that needs it.
         calcium, length = (self._subscribe(topic) for topic in ("calcium", "length"))
@@ -73,6 +76,9 @@ class Listening:
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
 
+    def _take_latched(self, message: Any) -> None:
+        self._inlet.take_calcium(Joints.of(message), latched=True)
+
     def _subscribe(self, topic: str) -> Any:
         arrivals = self.arrivals[topic]
         return self._node.create_subscription(
@@ -81,6 +87,7 @@ class Listening:
             arrivals,
             _qos(self._mode),
             event_callbacks=SubscriptionEventCallbacks(matched=arrivals.matched),
+            raw=self._bytes,
             **overridable(),
         )
 

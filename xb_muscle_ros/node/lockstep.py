@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -11,17 +10,18 @@ from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.node.names import Indices, front
+from xb_muscle_ros.node.plan import Divided, Plan, States, numbers
 from xb_muscle_ros.node.rules import Counts, Refusal, Trouble, scale_of
 from xb_muscle_ros.node.status import Account, Log, Snapshot, Status, time_went_back
-from xb_muscle_ros.node.stepping import Emit, Floats, outputs, stopped, use_threads
-from xb_muscle_ros.node.timeline import Plan, Timeline
+from xb_muscle_ros.node.stepping import Emit, Flags, Floats, outputs, stopped, use_threads
+from xb_muscle_ros.node.timeline import Timeline, history
 
 
 class Lockstep:
     """Answers every length message at once, with the forces of the fibres it names; the others do not move.
 
-    Every fibre has a `Timeline` of its own, so that its forces are those that a node with this one fibre would give.
-    Those that go the same way are stepped in one call.
+    Forces are those that a node with the one fibre would give. Fibres have one `Timeline` together as long as they take
+    the same samples, which a reset makes them begin anew; those that go the same way are stepped in one call.
 
     Attributes:
         batch: what is stepped; fibres may be exchanged between messages.
@@ -47,13 +47,15 @@ class Lockstep:
         self._violations = 0
         self._emit = emit
         self._log = log
+        self._simulated_time = simulated_time
         self._names = [muscle.fibre.name for muscle in batch.muscles]
-        # Whose time went back within a message, with the last stamp (ns) and what was taken until then.
-        self._back: list[tuple[int, int, Account]] = []
-        self._timelines = [
-            Timeline(scale_of(muscle.fibre), self.counts, simulated_time, functools.partial(self._note_back, i))
-            for i, muscle in enumerate(batch.muscles)
-        ]
+        self._every: Indices = np.arange(len(batch))
+        # Fibres as they were named last; mostly they are named so again.
+        self._named: Indices = self._every
+        # Whose time went back within a message, with the last stamp (ns) and what each had taken until then.
+        self._back: list[tuple[Sequence[int], int, Account]] = []
+        self._next_scales = np.array([scale_of(muscle.fibre) for muscle in batch.muscles])
+        self._timelines = [self._timeline(self._every)]
         self._use_scales()
 
     def start(self) -> None:
@@ -66,38 +68,47 @@ class Lockstep:
     def replace(self, index: int, fibre: Fibre) -> None:
         """Go on with other parameters of one fibre; its constants count from its next reset on."""
         self.batch = self.batch.replaced(index, fibre)
-        self._timelines[index].next_scale = scale_of(fibre)
+        self._next_scales[index] = scale_of(fibre)
+        for timeline in self._timelines:
+            timeline.next_scale = self._next_scales[timeline.places]
 
     def reset(self) -> Account:
         """Forget all fibres' states, stamps and calcium. Returns what was taken until now, over all of them."""
-        account = _total(timeline.reset() for timeline in self._timelines)
+        account = _total((timeline.fibres, timeline.run.account()) for timeline in self._timelines)
+        self._timelines = [self._timeline(self._every)]
         self._use_scales()
         return account
 
     def save(self) -> tuple[Snapshot, ...]:
         """One snapshot for each fibre; see `Timeline.save`."""
+        where = {i: (timeline, k) for timeline in self._timelines for k, i in enumerate(timeline.fibres)}
         made = []
-        for i, timeline in enumerate(self._timelines):
+        for i in range(len(self._names)):
+            timeline, k = where[i]
             try:
-                made.append(timeline.save())
+                made.append(timeline.save(k))
             except UserError as error:
                 raise UserError(f"{front(self._names, [i], begin='fibre ')}{error}") from error
         return tuple(made)
 
     def load(self, snapshots: Sequence[Snapshot]) -> None:
         """Go on from snapshots, one for each fibre; see `Timeline.load`."""
-        for timeline, snapshot in zip(self._timelines, snapshots, strict=True):
-            timeline.load(snapshot)
+        alike: dict[object, list[int]] = {}
+        for i, snapshot in enumerate(snapshots):
+            alike.setdefault(history(snapshot), []).append(i)
+        self._timelines = [self._timeline(np.array(which, dtype=np.intp)) for which in alike.values()]
+        for timeline in self._timelines:
+            timeline.load([snapshots[i] for i in timeline.fibres])
         self._use_scales()
 
     def take_calcium(self, stamp: int, fibres: Indices, calcium_um: Floats) -> list[Trouble]:
         """Keep calcium samples (µM) of some fibres with one stamp (ns); returns what was refused."""
-        troubles = []
-        for i, value in zip(fibres.tolist(), calcium_um.tolist(), strict=True):
+        troubles: list[Trouble] = []
+        for timeline, values in self._shares(fibres, calcium_um):
             try:
-                self._timelines[i].take_calcium(stamp, value)
+                timeline.take_calcium(stamp, numbers(values))
             except Refusal as refusal:
-                troubles.append(Trouble(i, refusal))
+                troubles += [Trouble(i, refusal) for i in timeline.fibres]
         return troubles
 
     def take_length(
@@ -109,22 +120,20 @@ class Lockstep:
         """
         del velocity_m_per_s
         troubles: list[Trouble] = []
-        plans: list[tuple[int, Plan]] = []
-        for i, position in zip(fibres.tolist(), position_m.tolist(), strict=True):
-            try:
-                plans.append((i, self._timelines[i].plan(stamp, position)))
-            except Refusal as refusal:
-                troubles.append(Trouble(i, refusal))
+        plans = []
+        for timeline, values in self._shares(fibres, position_m):
+            plan = self._plan(timeline, stamp, values, troubles)
+            if plan is not None:
+                plans.append((timeline, plan))
         if self._back:
-            which, last, taken = zip(*self._back, strict=True)
-            self._log.warning(front(self._names, which) + time_went_back(last[0], stamp, _total(taken)))
+            which = sorted(i for back, _, _ in self._back for i in back)
+            taken = _total((back, account) for back, _, account in self._back)
+            self._log.warning(front(self._names, which) + time_went_back(self._back[0][1], stamp, taken))
             self._back.clear()
             self._use_scales()
-        # The batch knows its fibres by their place.
-        plans.sort()
         done, states = self._stepped(plans, troubles)
-        if done:
-            chosen = None if len(done) == len(self._timelines) else np.array(done, dtype=np.intp)
+        if done.size:
+            chosen = None if done.size == len(self._names) else done
             self._answers += 1
             scales = self._scales if chosen is None else self._scales[chosen]
             self._emit(stamp, chosen, outputs(self.batch, chosen, states), scales)
@@ -132,54 +141,125 @@ class Lockstep:
 
     def status(self) -> Status:
         """How it goes, over all fibres."""
-        waiting = [i for i, timeline in enumerate(self._timelines) if timeline.run.state is None]
-        faults = {i: timeline.run.fault for i, timeline in enumerate(self._timelines) if timeline.run.fault}
+        waiting = sorted(i for timeline in self._timelines if timeline.run.states is None for i in timeline.fibres)
+        faults = {i: timeline.run.fault for timeline in self._timelines if timeline.run.fault for i in timeline.fibres}
         what = f"{front(self._names, waiting)}waiting for the first length sample and its calcium"
         return Status(self._answers, self._violations, stopped(self._names, faults), what if waiting else "")
 
-    def _stepped(
-        self, plans: Sequence[tuple[int, Plan]], troubles: list[Trouble]
-    ) -> tuple[list[int], Sequence[Floats] | Floats]:
-        """Fibres that came to the ends of their plans, and their states there; the others go to the troubles."""
-        together = self._together([plan for _, plan in plans])
+    def _timeline(self, fibres: Indices) -> Timeline:
+        return Timeline(fibres.tolist(), self._next_scales[fibres], self.counts, self._simulated_time, self._note_back)
+
+    def _shares(self, fibres: Indices, values: Floats) -> Iterator[tuple[Timeline, Floats]]:
+        """Timelines of the fibres that a message names, and their values; those that it names in part are parted."""
+        if len(self._timelines) == 1 and (fibres is self._named or np.array_equal(fibres, self._every)):
+            self._named = fibres
+            yield self._timelines[0], values
+            return
+        place = np.full(len(self._names), -1, dtype=np.intp)
+        place[fibres] = np.arange(fibres.size)
+        for timeline in tuple(self._timelines):
+            named = place[timeline.places] >= 0
+            if not named.any():
+                continue
+            if not named.all():
+                self._part(timeline, named)
+            yield timeline, values[place[timeline.places]]
+
+    def _part(self, timeline: Timeline, stay: Flags) -> Timeline:
+        other = timeline.part(stay)
+        self._timelines.append(other)
+        return other
+
+    def _plan(self, timeline: Timeline, stamp: int, values: Floats, troubles: list[Trouble]) -> Plan | None:
+        """What a sample asks for of the fibres of a timeline that can take it; the others go to the troubles."""
+        try:
+            return timeline.plan(stamp, numbers(values))
+        except Refusal as refusal:
+            troubles += [Trouble(i, refusal) for i in timeline.fibres]
+        except Divided as divided:
+            troubles += [Trouble(timeline.fibres[k], refusal) for k, refusal in divided.refused.items()]
+            if divided.good.any():
+                self._part(timeline, divided.good)
+                return self._plan(timeline, stamp, values[divided.good], troubles)
+        return None
+
+    def _stepped(self, plans: Sequence[tuple[Timeline, Plan]], troubles: list[Trouble]) -> tuple[Indices, States]:
+        """Fibres that came to the ends of their plans, ascending, and their states there; others go to the troubles."""
+        together = self._together(plans)
         if together is not None:
-            for (i, plan), state in zip(plans, together, strict=True):
-                self._timelines[i].commit(plan, state)
-            return [i for i, _ in plans], together
-        done, states = [], []
-        for i, plan in plans:
-            timeline = self._timelines[i]
+            for timeline, plan in plans:
+                timeline.commit(plan, together if len(plans) == 1 else together[timeline.places])
+            return self._every, together
+        parts = [self._one_by_one(timeline, plan, troubles) for timeline, plan in plans]
+        if len(parts) == 1:
+            return parts[0]
+        done = np.concatenate([fibres for fibres, _ in parts]) if parts else np.empty(0, dtype=np.intp)
+        order = np.argsort(done)
+        return done[order], np.array([state for _, states in parts for state in states])[order]
+
+    def _one_by_one(self, timeline: Timeline, plan: Plan, troubles: list[Trouble]) -> tuple[Indices, States]:
+        """Fibres of a timeline that came to the end of its plan, and their states there.
+
+        Those that fail go to the troubles, and have a timeline of their own from now on.
+        """
+        states = []
+        failed: dict[int, UserError] = {}
+        for k, i in enumerate(timeline.fibres):
             try:
-                states.append(plan.step(self.batch.muscles[i]))
+                states.append(plan.step(self.batch, i, k))
             except UserError as error:
                 self._violations += isinstance(error, StateViolation)
-                troubles.append(Trouble(i, timeline.failed(plan, error)))
-                continue
-            timeline.commit(plan, states[-1])
-            done.append(i)
+                failed[i] = error
+        if not failed:
+            timeline.commit(plan, states)
+            return timeline.places, states
+        done = np.array([i for i in timeline.fibres if i not in failed], dtype=np.intp)
+        for i, why in failed.items():
+            one = timeline
+            if len(timeline.fibres) > 1:
+                stay = timeline.places != i
+                one, plan = self._part(timeline, stay), plan.picked(np.flatnonzero(stay))
+            troubles.append(Trouble(i, one.failed(plan, why)))
+        if states:
+            timeline.commit(plan, states)
         return done, states
 
-    def _together(self, plans: Sequence[Plan]) -> Floats | None:
+    def _together(self, plans: Sequence[tuple[Timeline, Plan]]) -> Floats | None:
         """States of all fibres at the ends of their plans; None where they cannot, or one need not, go in one call."""
-        if len(plans) != len(self._timelines) or len(plans) == 1:
+        count = len(self._names)
+        if count == 1 or sum(len(timeline.fibres) for timeline, _ in plans) != count:
             return None
-        dt_s = plans[0].dt_s
-        if any(plan.state is None or plan.dt_s != dt_s for plan in plans):
+        dt_s = plans[0][1].dt_s
+        if any(plan.states is None or plan.dt_s != dt_s for _, plan in plans):
             return None
-        states = np.array([plan.state for plan in plans])
-        change, calcium = np.array([(plan.change_l0, plan.calcium_um) for plan in plans]).T
+        if len(plans) == 1:
+            states, change, calcium = plans[0][1].states, plans[0][1].change_l0, plans[0][1].calcium_um
+            assert states is not None
+            states = np.asarray(states)
+        else:
+            change, calcium = np.empty((2, count))
+            states = np.empty((count, len(self.batch.state_names)))
+            for timeline, plan in plans:
+                at = timeline.places
+                states[at], change[at], calcium[at] = plan.states, plan.change_l0, plan.calcium_um
         try:
             return self.batch.step(states, change, calcium, dt_s)
         except UserError:
             return None
 
-    def _note_back(self, i: int, last: int, taken: Account) -> None:
-        self._back.append((i, last, taken))
+    def _note_back(self, fibres: Sequence[int], last: int, taken: Account) -> None:
+        self._back.append((fibres, last, taken))
 
     def _use_scales(self) -> None:
-        self._scales = np.array([timeline.run.scale for timeline in self._timelines])
+        scales = np.empty((len(self._names), 2))
+        for timeline in self._timelines:
+            scales[timeline.places] = timeline.run.scale
+        self._scales = scales
 
 
-def _total(accounts: Iterable[Account]) -> Account:
-    """Sum over fibres."""
-    return Account(*(sum(column) for column in zip(*accounts, strict=True)))
+def _total(taken: Iterable[tuple[Sequence[int], Account]]) -> Account:
+    """Sum over fibres of what each of some took."""
+    made = np.zeros(len(Account._fields), dtype=np.int64)
+    for fibres, account in taken:
+        made += len(fibres) * np.array(account)
+    return Account(*made.tolist())

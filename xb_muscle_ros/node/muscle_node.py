@@ -32,6 +32,7 @@ from xb_muscle_ros.node.privileges import drop_priority, lock_memory, take_prior
 from xb_muscle_ros.node.realtime import Realtime, Settings
 from xb_muscle_ros.node.reporter import Reporter
 from xb_muscle_ros.node.saved_state import StateFile
+from xb_muscle_ros.node.traffic import as_bytes
 
 
 class MuscleNode(LifecycleNode):
@@ -160,7 +161,8 @@ class MuscleNode(LifecycleNode):
             for topic in ("force", "moments")
         ]
         names = [fibre.name for fibre in fibres]
-        outlet = OutputMessages(names, *self._outlets)
+        force, moments = self._outlets
+        outlet = OutputMessages(names, force, moments, as_bytes())
         self._stepping = stepping = self._made(fibres, outlet)
         self._inlet = inlet = Inlet(names, stepping, self.get_logger())
         self._listening = Listening(self, inlet, self._mode)

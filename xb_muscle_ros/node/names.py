@@ -12,6 +12,8 @@ from xb_muscle_ros.node.rules import Refusal
 
 Indices = npt.NDArray[np.intp]
 
+KINDS_KEPT = 8
+"""Lists of names that are remembered: as many senders may have a part of the fibres each."""
 _NAMES_SHOWN = 3
 # A sender that makes up names must not fill the memory.
 _STRANGERS_KEPT = 1000
@@ -38,7 +40,9 @@ class Names:
         self._index = {name: i for i, name in enumerate(fibres)}
         self._all = np.arange(len(fibres))
         self._strangers: set[str] = set()
-        self._last: tuple[list[str], Places] = ([], Places(self._all, None, []))
+        none: tuple[str, ...] = ()
+        self._last = none, Places(self._all, None, [])
+        self._known = dict([self._last])
 
     def places(self, names: Sequence[str], values: int, field: str) -> Places:
         """Which fibres the values of a message are of; of a name that comes twice the first counts.
@@ -54,11 +58,20 @@ class Names:
         if values != (len(names) or len(self._all)):
             detail = f"{values} values in {field} for {len(names)} names; send one per name"
             raise Refusal("wrong array size", detail)
-        last, found = self._last
-        if names != last:
-            found = self._find(names)
-            # New names are news only once.
-            self._last = ([*names], found._replace(new=[]))
+        last, places = self._last
+        if names is last:
+            return places
+        kind = tuple(names)
+        found = self._known.get(kind)
+        if found is not None:
+            self._last = kind, found
+            return found
+        found = self._find(kind)
+        if len(self._known) >= KINDS_KEPT:
+            self._known.clear()
+        # New names are news only once.
+        self._known[kind] = found._replace(new=[])
+        self._last = kind, self._known[kind]
         return found
 
     def _find(self, names: Sequence[str]) -> Places:

@@ -1,17 +1,22 @@
-"""Force and moments as messages, filled in place: nothing is allocated per tick."""
+"""Force and moments of a muscle node's fibres as messages."""
+
+# mypy: allow-untyped-decorators
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from sensor_msgs.msg import JointState
+from numba import njit
 
 from xb_muscle_ros.models.muscle import Outputs
 from xb_muscle_ros.models.registry import PUSHES_F0
-from xb_muscle_ros.node.names import Indices
+from xb_muscle_ros.node.joint_state import FIELDS
+from xb_muscle_ros.node.names import KINDS_KEPT, Indices
 from xb_muscle_ros.node.stepping import Floats
+from xb_muscle_ros.node.traffic import Outlet
 from xb_muscle_ros.trials.simulated import MOMENTS
 
 _FORCE, _CE_LENGTH, _CE_VELOCITY, _FIRST = (
@@ -30,13 +35,20 @@ class OutputMessages:
         pushed: fibre and force (F0) of the strongest push since it was last cleared; None where all pulled.
     """
 
-    def __init__(self, fibres: Sequence[str], force: Any, moments: Any) -> None:
-        """Fill messages of these fibres; `force` and `moments` are publishers of rclpy."""
+    def __init__(self, fibres: Sequence[str], force: Any, moments: Any, bytes_: bool = False) -> None:
+        """Fill messages of these fibres; `force` and `moments` are publishers of rclpy; `bytes_` as in `Outlet`."""
         self.pushed: tuple[str, float] | None = None
         self._names = list(fibres)
         self._to_force = force
         self._to_moments = moments
-        self._all = _Pair(self._names)
+        self._bytes = bytes_
+        self._all = self._made(self._names)
+        # Those who come in part mostly come in the same parts.
+        self._part = functools.lru_cache(KINDS_KEPT)(self._made_of)
+        # The first message shall not wait for a compiler.
+        force, _ = self._all
+        size = len(self._names)
+        _fill(np.zeros((size, len(Outputs._fields))), np.zeros((size, 2)), force.position, force.velocity, force.effort)
 
     def publish(self, stamp_ns: int, which: Indices | None, outputs: Floats, scales: Floats) -> None:
         """Send the outputs of one moment.
@@ -47,53 +59,36 @@ class OutputMessages:
             outputs: shape (fibres, 11), a column for each name of `Outputs`.
             scales: shape (fibres, 2), one L0 (m) and one F0 (N).
         """
-        pair = self._all if which is None else _Pair([self._names[i] for i in which.tolist()])
-        pair.fill(stamp_ns, outputs, scales)
-        forces = outputs[:, _FORCE].tolist()
-        least = min(forces)
+        force, moments = self._all if which is None else self._part(which.tobytes())
+        weakest, least = _fill(outputs, scales, force.position, force.velocity, force.effort)
+        force.publish(stamp_ns)
         if least < PUSHES_F0 and (self.pushed is None or least < self.pushed[1]):
-            self.pushed = pair.force.name[forces.index(least)], least
-        self._to_force.publish(pair.force)
+            self.pushed = force.names[weakest], least
         # Publishing is the dearest part of a tick; nobody misses what nobody listens to.
         if self._to_moments.get_subscription_count():
-            pair.fill_moments(stamp_ns, outputs)
-            self._to_moments.publish(pair.moments)
+            moments.position[:] = outputs[:, _MOMENTS].ravel()
+            moments.publish(stamp_ns)
 
+    def _made_of(self, which: bytes) -> tuple[Outlet, Outlet]:
+        return self._made([self._names[i] for i in np.frombuffer(which, dtype=np.intp).tolist()])
 
-class _Pair:
-    """Messages for some fibres, filled in place."""
-
-    def __init__(self, fibres: Sequence[str]) -> None:
-        self.force, self.moments = JointState(), JointState()
-        self.force.name = list(fibres)
-        self.moments.name = [f"{fibre}/{name}" for fibre in fibres for name in MOMENTS]
-        self._position, self._velocity, self._effort = (
-            array(self.force, field, len(fibres)) for field in ("position", "velocity", "effort")
+    def _made(self, names: Sequence[str]) -> tuple[Outlet, Outlet]:
+        moments = [f"{fibre}/{name}" for fibre in names for name in MOMENTS]
+        return (
+            Outlet(self._to_force, names, len(names), FIELDS, self._bytes),
+            Outlet(self._to_moments, moments, len(moments), FIELDS[:1], self._bytes),
         )
-        self._values = array(self.moments, "position", len(self.moments.name))
-
-    def fill(self, stamp_ns: int, outputs: Floats, scales: Floats) -> None:
-        """Put forces in, and the contractile elements' lengths and velocities."""
-        set_stamp(self.force, stamp_ns)
-        reference, f0 = scales.T
-        np.multiply(outputs[:, _FORCE], f0, out=self._effort)
-        np.multiply(reference, 1.0 + outputs[:, _CE_LENGTH], out=self._position)
-        np.multiply(reference, outputs[:, _CE_VELOCITY], out=self._velocity)
-
-    def fill_moments(self, stamp_ns: int, outputs: Floats) -> None:
-        """Put the moments in."""
-        set_stamp(self.moments, stamp_ns)
-        self._values[:] = outputs[:, _MOMENTS].ravel()
 
 
-def set_stamp(message: JointState, stamp_ns: int) -> None:
-    """Put a time in ns into a message."""
-    stamp = message.header.stamp
-    stamp.sec, stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
-
-
-def array(message: JointState, field: str, size: int) -> Floats:
-    """Array of a message's field with room for `size` values: what is put into it is in the message."""
-    setattr(message, field, [0.0] * size)
-    # The message keeps a copy of what it is given; only its own memory is worth holding on to.
-    return np.frombuffer(getattr(message, field), dtype=np.float64)  # type: ignore[no-any-return, unused-ignore]
+@njit(cache=True)
+def _fill(outputs: Floats, scales: Floats, position: Floats, velocity: Floats, effort: Floats) -> tuple[int, float]:
+    """Put force and contractile elements into a message; returns who pulls least, and that force in F0."""
+    weakest = 0
+    for k in range(outputs.shape[0]):
+        reference_m, f0_n = scales[k]
+        effort[k] = f0_n * outputs[k, _FORCE]
+        position[k] = reference_m * (1.0 + outputs[k, _CE_LENGTH])
+        velocity[k] = reference_m * outputs[k, _CE_VELOCITY]
+        if outputs[k, _FORCE] < outputs[weakest, _FORCE]:
+            weakest = k
+    return weakest, outputs[weakest, _FORCE]

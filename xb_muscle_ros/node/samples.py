@@ -1,13 +1,16 @@
 """The newest samples of a realtime node's fibres: put in place by callbacks, read by the thread that ticks."""
 
+# mypy: allow-untyped-decorators
+
 from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from xb_muscle_ros.node.names import Indices, front
 from xb_muscle_ros.node.rules import (
@@ -25,9 +28,13 @@ from xb_muscle_ros.node.rules import (
     went_back,
 )
 from xb_muscle_ros.node.status import Account, Log, time_went_back
-from xb_muscle_ros.node.stepping import Floats
+from xb_muscle_ros.node.stepping import Flags, Floats
 
 Stamps = npt.NDArray[np.int64]
+
+_NO_VELOCITY = np.empty(0)
+# The rules themselves, for one value, within compiled loops.
+_inside, _follows, _length_change_l0 = njit(inside), njit(follows), njit(length_change_l0)
 
 
 class Inputs(NamedTuple):
@@ -50,10 +57,58 @@ class Inputs(NamedTuple):
 
     def carried_on(self, time_ns: int, limit_s: float) -> Floats:
         """Length changes carried on by their velocities, where there are any and they lead to what is allowed."""
-        ahead = np.minimum(np.maximum((time_ns - self.arrival_ns) * 1e-9, 0.0), limit_s)
-        change = self.change_l0 + self.velocity_l0_per_s * ahead
-        # Where the velocity would lead out of what is allowed, the sample itself is the better guess.
-        return np.where(inside(change, LENGTH_CHANGE_L0), change, self.change_l0)
+        carried: Floats = _carried_on(self.change_l0, self.velocity_l0_per_s, self.arrival_ns, time_ns, limit_s)
+        return carried
+
+
+@njit(cache=True)
+def _carried_on(
+    change_l0: Floats, velocity_l0_per_s: Floats, arrival_ns: Stamps, time_ns: int, limit_s: float
+) -> Floats:
+    """See `Inputs.carried_on`."""
+    carried = change_l0.copy()
+    for k in range(carried.size):
+        ahead_s = min(max((time_ns - arrival_ns[k]) * 1e-9, 0.0), limit_s)
+        change = change_l0[k] + velocity_l0_per_s[k] * ahead_s
+        # Where the velocity would lead out of what is allowed, or there is none, the sample is the better guess.
+        if _inside(change, LENGTH_CHANGE_L0):
+            carried[k] = change
+    return carried
+
+
+@njit(cache=True)
+def _judged(
+    stamp: int, position_m: Floats, velocity_m_per_s: Floats, reference_m: Floats, last: Stamps
+) -> tuple[Floats, Floats, Flags, bool]:
+    """Length changes (L0), velocities (L0/s; NaN where there are none), who can take them, and whether all can.
+
+    Args:
+        stamp, last: of the sample and of each fibre's last one, ns; a stamp of 0 follows any.
+        position_m, velocity_m_per_s: shape (fibres,), the latter may be empty.
+        reference_m: one L0 of each fibre.
+    """
+    change, rate = np.empty(position_m.size), np.full(position_m.size, np.nan)
+    good = np.empty(position_m.size, dtype=np.bool_)
+    all_good = True
+    for k in range(change.size):
+        change[k] = _length_change_l0(position_m[k], reference_m[k])
+        good[k] = _inside(change[k], LENGTH_CHANGE_L0) and (stamp == 0 or _follows(stamp, last[k]))
+        if velocity_m_per_s.size:
+            rate[k] = velocity_m_per_s[k] / reference_m[k]
+            good[k] = good[k] and _inside(rate[k], VELOCITY_L0_PER_S)
+        all_good = all_good and good[k]
+    return change, rate, good, all_good
+
+
+@njit(cache=True)
+def _put(
+    fibres: Indices, change: Floats, rate: Floats, now_ns: int, changes: Floats, rates: Floats, arrivals: Stamps
+) -> int:
+    """Put what came for some fibres among that of all; returns the oldest arrival, ns."""
+    for k in range(fibres.size):
+        i = fibres[k]
+        changes[i], rates[i], arrivals[i] = change[k], rate[k], now_ns
+    return int(arrivals.min())
 
 
 class Samples:
@@ -88,6 +143,10 @@ class Samples:
         self._simulated_time = simulated_time
         self._length_stamps = np.full(count, NO_STAMP, dtype=np.int64)
         self._calcium_stamps = self._length_stamps.copy()
+        # Neither the first tick nor the first message shall wait for a compiler.
+        self.inputs.carried_on(0, 0.0)
+        change, rate, *_ = _judged(0, none, _NO_VELOCITY, none, zero)
+        _put(np.arange(0), change[:0], rate[:0], 0, none.copy(), none.copy(), zero.copy())
 
     def take_calcium(self, stamp: int, fibres: Indices, calcium_um: Floats) -> list[Trouble]:
         """Use calcium (µM) of some fibres from the next tick on; a stamp of 0 stands for an unstamped message."""
@@ -118,24 +177,18 @@ class Samples:
             back = went_back(stamp, last)
             last = np.where(back, NO_STAMP, last)
             reference = np.where(back, self.next_scale[fibres, 0], reference)
-        change = length_change_l0(position_m, reference)
-        good = inside(change, LENGTH_CHANGE_L0)
-        if stamp != 0:
-            good &= follows(stamp, last)
-        rate: Any = np.nan
-        if velocity_m_per_s is not None:
-            rate = velocity_m_per_s / reference
-            good &= inside(rate, VELOCITY_L0_PER_S)
+        velocity = _NO_VELOCITY if velocity_m_per_s is None else velocity_m_per_s
+        change, rate, good, all_good = _judged(stamp, position_m, velocity, reference, last)
         troubles = []
-        if not good.all():
+        if not all_good:
             for k in np.flatnonzero(~good).tolist():
-                why = outside(float(np.broadcast_to(rate, good.shape)[k]), VELOCITY_L0_PER_S, "velocity", "L0/s")
+                why = outside(float(rate[k]), VELOCITY_L0_PER_S, "velocity", "L0/s")
                 if stamp != 0 and not follows(stamp, int(last[k])):
                     why = out_of_order(stamp, int(last[k]), "length")
                 elif not inside(change[k], LENGTH_CHANGE_L0):
                     why = impossible_length(float(position_m[k]), float(reference[k]))
                 troubles.append(Trouble(int(fibres[k]), why))
-            fibres, change, rate = fibres[good], change[good], rate if velocity_m_per_s is None else rate[good]
+            fibres, change, rate = fibres[good], change[good], rate[good]
         if back is not None and (back & good).any():
             self._begin_again(stamp, fibres[back[good]])
             old = self.inputs
@@ -143,8 +196,8 @@ class Samples:
             self._length_stamps[fibres] = stamp
         self.taken[fibres, 0] += 1
         changes, rates, arrivals = old.change_l0.copy(), old.velocity_l0_per_s.copy(), old.arrival_ns.copy()
-        changes[fibres], rates[fibres], arrivals[fibres] = change, rate, time.monotonic_ns()
-        self.inputs = Inputs(changes, rates, old.calcium_um, arrivals, min(arrivals.tolist()), old.scale, old.run)
+        oldest = _put(fibres, change, rate, time.monotonic_ns(), changes, rates, arrivals)
+        self.inputs = Inputs(changes, rates, old.calcium_um, arrivals, oldest, old.scale, old.run)
         return troubles
 
     def forget(self, which: Indices) -> None:

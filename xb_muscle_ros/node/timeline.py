@@ -1,17 +1,16 @@
-"""What a fibre in lockstep has taken: stamps, calcium, state, and what the next sample asks for."""
+"""What fibres in lockstep have taken: stamps, calcium, state, and what the next sample asks for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.node.calcium import KEPT, CalciumHistory
+from xb_muscle_ros.node.names import Indices
+from xb_muscle_ros.node.plan import Numbers, Plan, States, let_pass, number, numbers
 from xb_muscle_ros.node.rules import (
     LENGTH_CHANGE_L0,
     NO_STAMP,
@@ -28,34 +27,7 @@ from xb_muscle_ros.node.rules import (
     went_back,
 )
 from xb_muscle_ros.node.status import Account, Snapshot, no_state
-
-
-class Plan(NamedTuple):
-    """A length sample that can be integrated.
-
-    Attributes:
-        stamp, asked: of the sample, and until when calcium was asked for, ns.
-        change_l0, calcium_um: to step to, and with.
-        state: to step from; None: settle.
-        dt_s: from the last sample; 0 where there is none.
-    """
-
-    stamp: int
-    asked: int
-    change_l0: float
-    calcium_um: float
-    state: npt.NDArray[np.float64] | None
-    dt_s: float
-
-    def step(self, muscle: Muscle) -> npt.NDArray[np.float64]:
-        """State at its end.
-
-        Raises:
-            UserError, StateViolation: see `Muscle`.
-        """
-        if self.state is None:
-            return muscle.settle(self.change_l0, self.calcium_um)
-        return muscle.step(self.state, self.change_l0, self.calcium_um, self.dt_s)
+from xb_muscle_ros.node.stepping import Flags, Floats
 
 
 @dataclass
@@ -63,15 +35,16 @@ class Run:
     """What a reset forgets.
 
     Attributes:
-        scale: in use.
-        fault: why it stopped; empty where it did not.
+        scale: in use, shape (fibres, 2): one L0 (m) and one F0 (N).
+        states: shape (fibres, n).
+        fault: why they stopped; empty where they did not.
     """
 
-    scale: Scale
-    state: npt.NDArray[np.float64] | None = None
-    # Stamp (ns) and length change (L0) of the last length sample, and until when calcium was asked for, ns.
+    scale: Floats
+    states: States | None = None
+    # Stamp (ns) and length changes (L0) of the last length sample, and until when calcium was asked for, ns.
     stamp: int = NO_STAMP
-    change: float = 0.0
+    change: Numbers = 0.0
     asked: int = NO_STAMP
     calcium: CalciumHistory = field(default_factory=CalciumHistory)
     # Stamp of the last calcium sample of this run, ns; older ones may be left from before time went back.
@@ -83,13 +56,32 @@ class Run:
     calcium_samples: int = 0
     late: int = 0
 
+    def __post_init__(self) -> None:
+        # One L0, m.
+        self.reference = numbers(self.scale[:, 0])
+
     def account(self) -> Account:
-        """What was taken."""
+        """What each fibre has taken."""
         return Account(self.samples, self.calcium_samples, self.late)
+
+    def picked(self, which: Indices) -> Run:
+        """The same for some of the fibres."""
+
+        def pick(values: Numbers) -> Numbers:
+            return numbers(np.atleast_1d(values)[which])
+
+        return replace(
+            self,
+            scale=self.scale[which],
+            states=None if self.states is None else np.asarray(self.states)[which],
+            change=pick(self.change) if self.stamp != NO_STAMP else 0.0,
+            calcium=self.calcium.each(pick),
+            coming=self.coming.each(pick),
+        )
 
 
 class Timeline:
-    """What one fibre has taken and what may come next; the stepping itself is left to others.
+    """What fibres have taken that take the same samples, and what may come next; the stepping is left to others.
 
     Calcium is held from its stamp to the next one. The step that ends at t_k uses the newest calcium with a stamp not
     after t_(k-1), so that a calcium sample has one whole step's time to arrive. The first sample settles isometrically.
@@ -97,58 +89,87 @@ class Timeline:
     Where time is simulated, a length sample whose stamp went back (see `went_back`) resets and settles anew.
 
     Attributes:
+        fibres: whose, ascending; all that are named here by a place are named by a place in this list.
         run: since the last reset.
         next_scale: becomes the scale in use at the next reset.
     """
 
     def __init__(
-        self, scale: Scale, counts: Counts, simulated_time: Callable[[], bool], on_back: Callable[[int, Account], None]
+        self,
+        fibres: Sequence[int],
+        scale: Floats,
+        counts: Counts,
+        simulated_time: Callable[[], bool],
+        on_back: Callable[[Sequence[int], int, Account], None],
     ) -> None:
         """Keep what is needed.
 
         Args:
-            scale: see above.
+            fibres: see above.
+            scale: shape (fibres, 2), see `Run`.
             counts: of what was odd about the input that was taken nevertheless.
             simulated_time: whether time may go back.
-            on_back: called where it did, with the last stamp (ns) and what had been taken.
+            on_back: called where it did, with the fibres, the last stamp (ns) and what each had taken.
         """
         self.next_scale = scale
         self._counts = counts
         self._simulated_time = simulated_time
         self._on_back = on_back
-        self.run = Run(scale)
+        self._become(fibres, Run(scale.copy()))
+
+    def _become(self, fibres: Sequence[int], run: Run) -> None:
+        self.fibres = list(fibres)
+        self.places: Indices = np.array(self.fibres, dtype=np.intp)
+        self.run = run
+
+    def part(self, stay: Flags) -> Timeline:
+        """Let fibres go, who from now on take other samples than those that stay; returns their timeline."""
+        run, fibres, scale = self.run, self.places, self.next_scale
+        kept, gone = np.flatnonzero(stay), np.flatnonzero(~stay)
+        other = Timeline(fibres[gone].tolist(), scale[gone], self._counts, self._simulated_time, self._on_back)
+        other.run = run.picked(gone)
+        self.next_scale = scale[kept]
+        self._become(fibres[kept].tolist(), run.picked(kept))
+        return other
 
     def reset(self) -> Account:
-        """Forget state, stamps and calcium; the next length sample settles anew. Returns what was taken until now."""
-        run, self.run = self.run, Run(self.next_scale)
+        """Forget state, stamps and calcium; the next length sample settles anew. Returns what each fibre had taken."""
+        run, self.run = self.run, Run(self.next_scale.copy())
         return run.account()
 
-    def save(self) -> Snapshot:
-        """All that the answers to later samples depend on.
+    def save(self, place: int) -> Snapshot:
+        """All that the answers of a fibre to later samples depend on.
 
         Raises:
             UserError: there is no state yet, or integration failed.
         """
         run = self.run
-        if run.fault or run.state is None:
+        if run.fault or run.states is None:
             raise no_state(run.fault, "the first length sample")
-        return Snapshot(run.state, run.scale, run.calcium.kept(), run.stamp, run.asked, run.account())
+        calcium = run.calcium.each(lambda values: number(values, place))
+        scale = Scale(*run.scale[place].tolist())
+        return Snapshot(run.states[place], scale, calcium.kept(), run.stamp, run.asked, run.account())
 
-    def load(self, snapshot: Snapshot) -> None:
-        """Go on from a snapshot: the next length sample is the one after its last; all taken since is forgotten."""
-        run = self.run = Run(snapshot.scale)
-        run.state = snapshot.state
-        run.change = float(snapshot.state[-3])
-        assert snapshot.stamp is not None
-        assert snapshot.asked is not None
-        run.stamp, run.asked = snapshot.stamp, snapshot.asked
-        for stamp, calcium_um in snapshot.calcium:
-            run.calcium.add(stamp, calcium_um)
+    def load(self, snapshots: Sequence[Snapshot]) -> None:
+        """Go on from snapshots, one for each fibre, which differ in values only; see `history`.
+
+        The next length sample is the one after their last; all taken since is forgotten.
+        """
+        first = snapshots[0]
+        run = self.run = Run(np.array([snapshot.scale for snapshot in snapshots]))
+        states = run.states = np.stack([snapshot.state for snapshot in snapshots])
+        run.change = numbers(states[:, -3].copy())
+        assert first.stamp is not None
+        assert first.asked is not None
+        run.stamp, run.asked = first.stamp, first.asked
+        values = np.array([[value for _, value in snapshot.calcium] for snapshot in snapshots])
+        for (stamp, _), calcium_um in zip(first.calcium, values.T, strict=True):
+            run.calcium.add(stamp, numbers(calcium_um))
         run.calcium_stamp = run.calcium.last_stamp
-        run.samples, run.calcium_samples, run.late = snapshot.account
+        run.samples, run.calcium_samples, run.late = first.account
 
-    def take_calcium(self, stamp: int, calcium_um: float) -> None:
-        """Keep a calcium sample (stamp in ns, µM).
+    def take_calcium(self, stamp: int, calcium_um: Numbers) -> None:
+        """Keep calcium samples (stamp in ns, µM).
 
         Raises:
             Refusal: the stamp is not after the last one.
@@ -168,21 +189,21 @@ class Timeline:
         if stamp <= run.asked:
             # A step that should have used it is done: this run differs from an offline replay of the same samples.
             run.late += 1
-            self._counts["late calcium"] += 1
+            self._counts["late calcium"] += len(self.fibres)
 
-    def plan(self, stamp: int, position_m: float) -> Plan:
+    def plan(self, stamp: int, position_m: Numbers) -> Plan:
         """What a length sample (stamp in ns, m) asks for; follow with `commit` or `failed`.
 
         Raises:
-            Refusal: the sample cannot be integrated.
+            Refusal: the sample cannot be integrated, by none of the fibres or by the only one.
+            Divided: some of many fibres cannot integrate it, or none can, each for a reason of its own.
         """
         back = went_back(stamp, self.run.stamp) and self._simulated_time()
         if self.run.fault and not back:
             raise Refusal("stopped", "integration failed before; call ~/reset to start again")
-        reference = (self.next_scale if back else self.run.scale).reference_length_m
+        reference = numbers(self.next_scale[:, 0]) if back else self.run.reference
         change = length_change_l0(position_m, reference)
-        if not inside(change, LENGTH_CHANGE_L0):
-            raise impossible_length(position_m, reference)
+        let_pass(inside(change, LENGTH_CHANGE_L0), impossible_length, position_m, reference)
         if back:
             self._begin_again(stamp)
         run = self.run
@@ -199,14 +220,13 @@ class Timeline:
             return Plan(stamp, asked, change, calcium, None, 0.0)
         dt_s = (stamp - last) / 1e9
         velocity = (change - run.change) / dt_s
-        if not inside(velocity, VELOCITY_L0_PER_S):
-            raise outside(velocity, VELOCITY_L0_PER_S, "velocity from the last sample to this", "L0/s")
-        return Plan(stamp, asked, change, calcium, run.state, dt_s)
+        let_pass(inside(velocity, VELOCITY_L0_PER_S), _too_fast, velocity)
+        return Plan(stamp, asked, change, calcium, run.states, dt_s)
 
-    def commit(self, plan: Plan, state: npt.NDArray[np.float64]) -> None:
-        """Take a plan's result up."""
+    def commit(self, plan: Plan, states: States) -> None:
+        """Take a plan's result up, shape (fibres, n)."""
         run = self.run
-        run.state, run.stamp, run.change, run.asked = state, plan.stamp, plan.change_l0, plan.asked
+        run.states, run.stamp, run.change, run.asked = states, plan.stamp, plan.change_l0, plan.asked
         run.samples += 1
 
     def failed(self, plan: Plan, error: UserError) -> UserError:
@@ -214,12 +234,12 @@ class Timeline:
         self.run.fault = f"{error} (in the step from {plan.asked * 1e-9:.9f} s to {plan.stamp * 1e-9:.9f} s)"
         return UserError(self.run.fault)
 
-    def _keep_for_later(self, stamp: int, calcium_um: float) -> None:
+    def _keep_for_later(self, stamp: int, calcium_um: Numbers) -> None:
         """Calcium that came before the length that takes time back waits for it."""
         coming = self.run.coming
         last = coming.last_stamp
         coming.add(_after(stamp, NO_STAMP if went_back(stamp, last) else last, "calcium"), calcium_um)
-        self._counts["calcium before its length went back"] += 1
+        self._counts["calcium before its length went back"] += len(self.fibres)
 
     def _begin_again(self, stamp: int) -> None:
         old = self.run
@@ -232,8 +252,17 @@ class Timeline:
             run.calcium.add(when, calcium_um)
         run.calcium_stamp = old.coming.last_stamp
         run.calcium_samples = len(old.coming.kept())
-        self._counts["time went back"] += 1
-        self._on_back(old.stamp, account)
+        self._counts["time went back"] += len(self.fibres)
+        self._on_back(self.fibres, old.stamp, account)
+
+
+def history(snapshot: Snapshot) -> object:
+    """What snapshots have in common whose fibres took the same samples."""
+    return snapshot.stamp, snapshot.asked, tuple(stamp for stamp, _ in snapshot.calcium), snapshot.account
+
+
+def _too_fast(velocity_l0_per_s: float) -> Refusal:
+    return outside(velocity_l0_per_s, VELOCITY_L0_PER_S, "velocity from the last sample to this", "L0/s")
 
 
 def _after(stamp: int, last: int, what: str) -> int:

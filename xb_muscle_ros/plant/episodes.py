@@ -13,8 +13,8 @@ from sensor_msgs.msg import JointState
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.node.client.link import Link
-from xb_muscle_ros.node.outputs import set_stamp
 from xb_muscle_ros.node.ticker import Ticker
+from xb_muscle_ros.node.traffic import set_stamp
 from xb_muscle_ros.plant.body import Body
 from xb_muscle_ros.plant.muscle_end import MuscleEnd
 from xb_muscle_ros.plant.plant_parameters import read

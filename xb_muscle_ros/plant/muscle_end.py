@@ -9,14 +9,14 @@ from collections.abc import Mapping
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.node.client.link import Link
 from xb_muscle_ros.node.client.wires import Sender, reliable
 from xb_muscle_ros.node.diagnostics import status_name
-from xb_muscle_ros.node.rules import stamp_ns
+from xb_muscle_ros.node.joint_state import Joints
+from xb_muscle_ros.node.traffic import subscribe
 from xb_muscle_ros.plant.plant import Architecture, Array
 
 FIND_S = 10.0
@@ -51,12 +51,12 @@ class MuscleEnd:
         self._link = link
         self._fibre = fibre
         self._mode = mode
-        self._names = [m.name for m in muscles]
+        self._names = tuple(m.name for m in muscles)
         self._l0_m = np.array([m.l0_m for m in muscles])
         self._f0_n = np.array([m.f0_n for m in muscles])
         self._length, self._calcium = (Sender(link.node, f"muscle/{t}", self._names) for t in ("length", "calcium"))
         self._inlets = (
-            link.node.create_subscription(JointState, "muscle/force", self._on_force, reliable()),
+            subscribe(link.node, "muscle/force", self._on_force, reliable()),
             link.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10),
         )
 
@@ -136,9 +136,9 @@ class MuscleEnd:
                 self.trouble = "" if status.level == DiagnosticStatus.OK else status.message
                 self.stuck = status.level == DiagnosticStatus.ERROR
 
-    def _on_force(self, message: JointState) -> None:
-        if list(message.name) == self._names:
-            force: Array = np.array(message.effort) / self._f0_n
+    def _on_force(self, message: Joints) -> None:
+        if message.names == self._names:
+            force: Array = message.effort / self._f0_n
             if self._mode == "lockstep":
-                self.forces[stamp_ns(message.header.stamp)] = force
+                self.forces[message.stamp_ns] = force
             self.newest = force, time.monotonic()

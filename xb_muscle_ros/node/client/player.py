@@ -6,19 +6,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from rclpy.duration import Duration
-from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.node.client.link import Link
 from xb_muscle_ros.node.client.wires import Sender, reliable
 from xb_muscle_ros.node.configuration import flat
-from xb_muscle_ros.node.rules import stamp_ns
+from xb_muscle_ros.node.joint_state import Joints
+from xb_muscle_ros.node.traffic import subscribe
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
 from xb_muscle_ros.trials.stamps import to_ns
 from xb_muscle_ros.trials.trial import Trial
@@ -98,8 +98,8 @@ class _Player:
         node = link.node
         self._length, self._calcium = (Sender(node, f"muscle/{topic}", [fibre]) for topic in ("length", "calcium"))
         self._inlets = [
-            node.create_subscription(JointState, "muscle/force", self._on_force, reliable()),
-            node.create_subscription(JointState, "muscle/moments", self._on_moments, reliable()),
+            subscribe(node, "muscle/force", self._on_force, reliable()),
+            subscribe(node, "muscle/moments", self._on_moments, reliable()),
         ]
         self._met = False
         self._begin({}, 0)
@@ -225,14 +225,14 @@ class _Player:
             f"{plan.stamps[k] * 1e-9:.9f} s within {self._timeout_s:g} s; its log says whether it refused the sample"
         )
 
-    def _on_force(self, message: Any) -> None:
-        k = self._index.get(stamp_ns(message.header.stamp))
+    def _on_force(self, message: Joints) -> None:
+        k = self._index.get(message.stamp_ns)
         if k is not None:
             self._force[k] = message.effort[0], message.position[0], message.velocity[0]
             self._missing[k] &= ~1
 
-    def _on_moments(self, message: Any) -> None:
-        k = self._index.get(stamp_ns(message.header.stamp))
+    def _on_moments(self, message: Joints) -> None:
+        k = self._index.get(message.stamp_ns)
         if k is not None:
             self._moments[k] = message.position
             self._missing[k] &= ~2

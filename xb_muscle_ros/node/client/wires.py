@@ -10,8 +10,9 @@ from typing import Any
 from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 from sensor_msgs.msg import JointState
 
-from xb_muscle_ros.node.outputs import array, set_stamp
+from xb_muscle_ros.node.joint_state import FIELDS
 from xb_muscle_ros.node.stepping import Floats
+from xb_muscle_ros.node.traffic import Outlet, as_bytes
 
 
 def reliable() -> QoSProfile:
@@ -29,13 +30,16 @@ class Sender:
     def __init__(self, node: Any, topic: str, fibres: Sequence[str], qos: Any = None) -> None:
         """Publish on a topic; without names for a node of one fibre. `qos` as for rclpy; None: reliable."""
         self.publisher = node.create_publisher(JointState, topic, reliable() if qos is None else qos)
-        self._message = JointState(name=list(fibres))
-        self._position = array(self._message, "position", max(len(fibres), 1))
+        # Without velocities, and with them.
+        self._still, self._moving = (
+            Outlet(self.publisher, fibres, max(len(fibres), 1), FIELDS[:count], as_bytes()) for count in (1, 2)
+        )
 
     def send(self, stamp_ns: int, values: Floats | float, velocity: Floats | None = None) -> None:
         """Publish values of the fibres, shape (fibres,), or one for all, and velocities where there are any."""
-        set_stamp(self._message, stamp_ns)
-        self._position[:] = values
-        if velocity is not None or self._message.velocity:
-            self._message.velocity = [] if velocity is None else velocity.tolist()
-        self.publisher.publish(self._message)
+        outlet = self._still
+        if velocity is not None:
+            outlet = self._moving
+            outlet.velocity[:] = velocity
+        outlet.position[:] = values
+        outlet.publish(stamp_ns)
