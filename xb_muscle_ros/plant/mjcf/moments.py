@@ -74,7 +74,8 @@ class JointMoments:
         if joint not in names:
             raise UserError(f"joint '{joint}' is not known{suggest(joint, names)}")
         number = names.index(joint)
-        angles = np.linspace(*self._own.jnt_range[number], postures)
+        first, last = self._own.jnt_range[number].tolist()
+        angles = np.linspace(first, last, postures)
         sums = np.array([self._at(number, float(angle), activation, qpos) for angle in angles])
         return Moments(angles, sums[:, 0], sums[:, 1])
 
