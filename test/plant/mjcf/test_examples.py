@@ -28,7 +28,7 @@ def test_examples_run_one_after_the_other(capsys: pytest.CaptureFixture[str], tm
     monkeypatch.chdir(tmp_path)
     names: dict[str, Any] = {}
     for block in blocks("python"):
-        exec(compile(block, str(PAGE), "exec"), names)  # noqa: S102
+        exec(compile(block, str(PAGE), "exec"), names)
     pull = re.search(r"tibialis anterior pulls with (\d+) N", capsys.readouterr().out)
     # More than settled at 5 %, on its way to half of F0.
     f0 = names["muscles"].f0_n[names["muscles"].names.index("tibant_r")]

@@ -35,6 +35,7 @@ class CrossBridgeMuscles:
         f0_n, l0_m: peak isometric force, N, and optimal fibre length, m, shape (muscle,).
         slack_m: length of the tendon, m, shape (muscle,); below 0 where the model's numbers leave none.
         fibres: one for each muscle.
+        fibre_groups: what steps them.
         activation: of the moment, 0 to 1, shape (muscle,).
 
     Source:
@@ -42,11 +43,15 @@ class CrossBridgeMuscles:
 
     Examples:
         >>> import mujoco, xb_muscle_ros as xb
-        >>> model = mujoco.MjModel.from_xml_path("arm.xml")  # doctest: +SKIP
-        >>> data = mujoco.MjData(model)  # doctest: +SKIP
-        >>> muscles = xb.CrossBridgeMuscles(model)  # doctest: +SKIP
-        >>> muscles.reset(data, muscles.calcium_um(0.1))  # doctest: +SKIP
-        >>> pull_n = muscles.step(data, excitation=0.5)  # doctest: +SKIP
+        >>> model = mujoco.MjModel.from_xml_string(
+        ...     '<mujoco><worldbody><body><joint name="hinge" axis="0 1 0"/><geom size=".1"/></body></worldbody>'
+        ...     '<actuator><muscle joint="hinge" lengthrange="-1 1" force="20"/></actuator></mujoco>'
+        ... )
+        >>> data = mujoco.MjData(model)
+        >>> muscles = xb.CrossBridgeMuscles(model)
+        >>> pull_n = muscles.reset(data, muscles.calcium_um(0.1))
+        >>> muscles.step(data, 0.5).shape  # excitation of all muscles; pulls, N
+        (1,)
     """
 
     def __init__(self, model: Any, table: Table = None) -> None:
