@@ -48,8 +48,8 @@ def curves(one: Muscle, change: float) -> tuple[float, float]:
 
 @functools.cache
 def without_lengths(model: str, pca: float) -> float:
-    """Isometric force of the heads of the same fibre with a rigid series element and neither relation, F0."""
-    stem = "hill" if model.startswith("hill") else "3state_coop_rigid"
+    """Isometric force of the same fibre with neither relation, F0: it is the same at any length."""
+    stem = model.split("+")[0]
     return muscle(stem).outputs(muscle(stem).settle(0.0, calcium(pca))).force_ce_f0
 
 
@@ -63,7 +63,8 @@ def test_isometric_force_is_in_proportion_to_the_share(model: str, change: float
     share, passive = curves(one, out.ce_length_change_l0)
     active = share * without_lengths(model, pca)
     # Where there is next to no active force, a series spring of a Hill-type model still finds 1e-4 of all heads' force.
-    spared = one.fibre.values["Fscale"] * LEAST if model in (HILL_SE, HILL_SLACK) else 0.0
+    # At no velocity the force-velocity relation is at 1.002.
+    spared = 1.01 * one.fibre.values["Fscale"] * LEAST if model in (HILL_SE, HILL_SLACK) else 0.0
     assert out.force_f0 == pytest.approx(active + passive, abs=1e-7 + spared)
     if active > spared:
         assert out.force_f0 == pytest.approx(active + passive, abs=1e-7)
@@ -73,7 +74,7 @@ def test_isometric_force_is_in_proportion_to_the_share(model: str, change: float
 @given(speed=st.floats(0.1, 10.0), pca=st.floats(4.5, 6.6), down=st.booleans())
 @few
 def test_the_spring_bears_what_heads_and_passive_force_do(fp_max: float, speed: float, pca: float, down: bool) -> None:
-    """Taut through 0.6 to 1.4 L0 and back, at any speed: spring = share * heads + passive, to 0.01 % F0."""
+    """Through 0.6 to 1.4 L0 and back, at any speed: spring = share * heads + passive, taut to 0.01 % F0."""
     one = muscle(SLACK, fp_max=fp_max)
     far = 0.4 / speed
     time = np.arange(int(4.0 * far / 1e-3) + 2) * 1e-3
@@ -86,7 +87,10 @@ def test_the_spring_bears_what_heads_and_passive_force_do(fp_max: float, speed: 
     l_se, v = states[:, one.state_names.index("l_se")], one.fibre.values
     spring = v["Fscale"] * v["kse0"] * np.expm1(v["kse"] * np.maximum(l_se, 0.0))
     np.testing.assert_allclose(out["force_ce_f0"], spring, rtol=0.0, atol=1e-12)
-    assert np.abs(heads - spring).max() < 1e-4
+    unequal, taut = np.abs(heads - spring), l_se > 0.0
+    assert unequal[taut].max() < 1e-4
+    # When a spring goes slack its stiffness jumps: without either relation the same shortening leaves 0.03 % F0.
+    assert unequal[~taut].max(initial=0.0) < 5e-4
     assert out["force_f0"].min() >= 0.0
     # Lengths add up: half-sarcomeres and spring are the fibre.
     np.testing.assert_allclose(out["ce_length_change_l0"] + l_se / v["gamma"], length, rtol=0.0, atol=1e-12)
