@@ -23,7 +23,7 @@ _TIMED = {**TABLES, _EXACT: {"default": {"parameters": {"smoothing": 0.0}}}}
 _TICK_S = 1e-3
 _ACTIVATION = 0.2
 # The body stands on its feet; before kinds of muscle lead to different contacts it starts anew.
-_EPISODE_TICKS, _EPISODES = 50, 80
+_EPISODE_TICKS, _EPISODES = 50, 16
 _RATIO, _REAL_TIME = {RIGID: "bar 1.7"}, {RIGID: "bar 6", ELASTIC: "bar 3"}
 
 
