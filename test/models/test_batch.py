@@ -10,6 +10,7 @@ import pytest
 from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import load_fibre
+from xb_muscle_ros.models.muscle import Outputs
 
 FIBRES = ("13Dec2017a", "13Dec2017b", "14Dec2017b", "18Dec2017a", "18Dec2017b", "19Dec2017a", "7Aug2018a")
 
@@ -57,3 +58,17 @@ def test_one_step_for_all_fibres() -> None:
     states = batch.settle(np.zeros(2), np.ones(2))
     with pytest.raises(UserError, match="step of 2 fibres is an array; needed is one number of seconds"):
         batch.step(states, np.zeros(2), np.ones(2), np.full(2, 1e-3))  # type: ignore[arg-type]
+
+
+def test_step_and_outputs_in_one_pass_are_those_of_two() -> None:
+    batch = MuscleBatch([load_fibre("18Dec2017a"), load_fibre("13Dec2017a")])
+    calcium = np.array([0.8, 1.5])
+    states = batch.settle(np.zeros(2), calcium)
+    length = np.array([0.001, -0.002])
+    after = batch.step(states, length, calcium, 1e-3)
+    out, table = np.empty_like(states), np.empty((2, len(Outputs._fields)))
+    batch.step_into(states, length, calcium, 1e-3, out, table)
+    assert out.tobytes() == after.tobytes()
+    assert table.tobytes() == batch.output_table(after).tobytes()
+    with pytest.raises(UserError, match="fibre 13Dec2017a: length change is -2 L0"):
+        batch.step_into(states, np.array([0.0, -2.0]), calcium, 1e-3, out, table)
