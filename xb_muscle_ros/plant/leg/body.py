@@ -63,6 +63,7 @@ class Body:
         mj: the engine's module.
         model, data: MuJoCo's.
         muscles: names of the actuators.
+        l0_m: optimal fibre length of each, as MuJoCo's muscle reads it, shape (muscle,).
         tick_s: length of one step.
     """
 
@@ -81,6 +82,8 @@ class Body:
         self.mj.mj_forward(self.model, self.data)
         names = self.mj.mjtObj
         self.muscles = tuple(self._name(names.mjOBJ_ACTUATOR, i) for i in range(self.model.nu))
+        span, fibres = self.model.actuator_lengthrange, self.model.actuator_gainprm[:, :2]
+        self.l0_m: Array = (span[:, 1] - span[:, 0]) / (fibres[:, 1] - fibres[:, 0])
         self.tick_s = float(self.model.opt.timestep)
         self._talus = [self.model.body(f"talus_{side}").id for side in SIDES]
         self._floor = self.model.geom("floor").id

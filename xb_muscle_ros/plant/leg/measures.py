@@ -12,7 +12,6 @@ STIFFNESS_AT_S = (0.02, 0.05, 0.1)
 COM_AT_S = (0.1, 0.3)
 BAR_M = 0.005
 """A stance holds as long as the centre of mass stays within."""
-_GROWING_S = 0.5
 Numbers = dict[str, float | None]
 
 
@@ -93,9 +92,9 @@ def held(episode: Episode) -> Numbers:
 def growth(nudged: Episode) -> Numbers:
     """What grows after a nudge: time in which it grows e-fold, and how far joints take part (angle by ankle angle).
 
-    Fitted to the logarithm of the centre of mass's way over the second half of a second; None: it does not grow.
+    Fitted to the logarithm of the centre of mass's way over the second half of the episode; None: it does not grow.
     """
-    late = nudged.time_s >= _GROWING_S - 1e-9
+    late = nudged.time_s >= 0.5 * nudged.time_s[-1]
     way = np.abs(nudged.com_m[late])
     if way.size < 2 or not np.all(way > 0.0):
         return {"e_fold_s": None}

@@ -103,9 +103,9 @@ def find_stance(body: Body, aim: Aim) -> Stance:
     lead, heights = float(measured(body)[0]), measured(body)[1:]
     if residual > RESIDUAL or abs(lead - aim.lead_m) > 2e-3 or not np.all((activation > 0.0) & (activation < 1.0)):
         raise UserError(
-            f"no stance found with the centre of mass {aim.lead_m:g} m before the ankles, knees at {aim.knee_rad:g} rad "
-            f"and activations from {aim.tone:g}: {residual:.2g} N·m are missing, the lead is {lead:.4f} m, activations "
-            f"reach {activation.max():.2f}; take --lead near 0.05 and --tone near 0.02"
+            f"no stance found with the centre of mass {aim.lead_m:g} m before the ankles, knees at {aim.knee_rad:g} "
+            f"rad and activations from {aim.tone:g}: {residual:.2g} N·m are missing, the lead is {lead:.4f} m, "
+            f"activations reach {activation.max():.2f}; take --lead near 0.05 and --tone near 0.02"
         )
     return Stance(aim, posture, found.force_n(activation), activation, residual, lead, heights)
 

@@ -60,9 +60,8 @@ def foremost_rad(body: Body, stance: Stance, fibre_l0: float) -> float:
     Raises:
         UserError: the ankle does not go so far.
     """
-    model, at = body.model, body.muscles.index(_SOLEUS)
-    span, fibre_range = model.actuator_lengthrange[at], model.actuator_gainprm[at, :2]
-    l0_m = float((span[1] - span[0]) / (fibre_range[1] - fibre_range[0]))
+    at = body.muscles.index(_SOLEUS)
+    wanted_m = fibre_l0 * float(body.l0_m[at])
 
     def length_m(angle_rad: float) -> float:
         qpos = stance.qpos.copy()
@@ -71,9 +70,9 @@ def foremost_rad(body: Body, stance: Stance, fibre_l0: float) -> float:
         return float(body.data.actuator_length[at])
 
     start = length_m(0.0)
-    if length_m(_FURTHEST_RAD) - start < fibre_l0 * l0_m:
+    if length_m(_FURTHEST_RAD) - start < wanted_m:
         raise UserError(f"the ankle does not reach a soleus change of {100.0 * fibre_l0:g} %; take a smaller --sway")
-    found = brentq(lambda angle: length_m(angle) - start - fibre_l0 * l0_m, 0.0, _FURTHEST_RAD, xtol=1e-14)
+    found = brentq(lambda angle: length_m(angle) - start - wanted_m, 0.0, _FURTHEST_RAD, xtol=1e-14)
     return float(found)
 
 
