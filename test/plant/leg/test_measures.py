@@ -19,7 +19,7 @@ RATE = math.sqrt((MGH - STIFFNESS) / INERTIA)
 
 
 def pendulum(speed: float, lost_nm: float = 0.0, seconds: float = 1.0, pushed: bool = False) -> Episode:
-    """Exact fall of a linear inverted pendulum on a spring that has lost some torque, after a push to a speed (rad/s)."""
+    """Exact fall of a linear inverted pendulum on a spring that has lost some torque; a push is a speed (rad/s)."""
     time = np.arange(0.0, seconds + 1e-9, 0.001)
     rest = lost_nm / (MGH - STIFFNESS)
     angle = rest * (np.cosh(RATE * time) - 1.0) + speed / RATE * np.sinh(RATE * time)

@@ -99,6 +99,6 @@ def test_stances_that_nobody_takes(values: dict[str, float], message: str) -> No
 def test_no_muscle_is_strong_enough(body: Body) -> None:
     """Gravity ten times as strong: the remedy is named, in one line."""
     body.model.opt.gravity[2] *= 10.0
-    with pytest.raises(UserError, match="no stance found with the centre of mass 0.05 m") as error:
+    with pytest.raises(UserError, match=r"no stance found with the centre of mass 0\.05 m") as error:
         find_stance(body, Aim())
     assert "\n" not in str(error.value)

@@ -80,14 +80,14 @@ class FibreMuscles:
         self.driven_by = {"calcium_um": dict(names)}
 
     def _calcium(self) -> Array:
-        """Calcium at which settled muscles pull as the stance asks: regula falsi (Illinois) in activation, all at once."""
+        """Calcium at which settled muscles pull as the stance asks: regula falsi (Illinois), all at once."""
         low, high = np.zeros_like(self._stance.force_n), np.ones_like(self._stance.force_n)
         below, above = self._excess_f0(low), self._excess_f0(high)
         for k in np.flatnonzero((below > 0.0) | (above < 0.0))[:1]:
             f0_n, asked = float(self._muscles.f0_n[k]), float(self._stance.force_n[k])
             raise UserError(
                 f"{self.model}: the stance asks {asked:.4g} N of {self._body.muscles[k]}, which at this length gives "
-                f"{asked + f0_n * below[k]:.4g} to {asked + f0_n * above[k]:.4g} N; take another --tone, or another model"
+                f"{asked + f0_n * below[k]:.4g} to {asked + f0_n * above[k]:.4g} N; take another --tone or model"
             )
         rose = np.full(low.shape, -1)
         for _ in range(_STEPS):
