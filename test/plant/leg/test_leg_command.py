@@ -32,6 +32,7 @@ def test_files_are_identical_when_repeated(tmp_path: Path, capsys: pytest.Captur
     assert tree["scene"] == "myolegs"
     assert tree["stance"]["residual_nm"] < 1e-6
     assert tree["stance"]["tone"] == 0.02
+    assert sum(tree["stance"]["normal_forces_n"]) == pytest.approx(tree["stance"]["mass_kg"] * 9.81, rel=1e-6)
     (run,) = tree["runs"]
     assert len(run["activation"]) == 80
     assert run["hold"]["largest_com_m"] < 5e-5

@@ -87,7 +87,8 @@ class FibreMuscles:
             f0_n, asked = float(self._muscles.f0_n[k]), float(self._stance.force_n[k])
             raise UserError(
                 f"{self.model}: the stance asks {asked:.4g} N of {self._body.muscles[k]}, which at this length gives "
-                f"{asked + f0_n * below[k]:.4g} to {asked + f0_n * above[k]:.4g} N; take another --tone or model"
+                f"{asked + f0_n * below[k]:.4g} to {asked + f0_n * above[k]:.4g} N; take another --tone or model,"
+                " or rigid tendons"
             )
         rose = np.full(low.shape, -1)
         for _ in range(_STEPS):

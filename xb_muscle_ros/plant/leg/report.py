@@ -13,6 +13,7 @@ from xb_muscle_ros.plant.leg.body import Body
 from xb_muscle_ros.plant.leg.episode import JOINTS, Episode
 from xb_muscle_ros.plant.leg.measures import STIFFNESS_AT_S, growth, held, numbers
 from xb_muscle_ros.plant.leg.stance import Stance
+from xb_muscle_ros.plant.leg.statics import demand
 from xb_muscle_ros.plant.leg.study import ModelRuns, Pair
 from xb_muscle_ros.plant.translation import RampAndHold
 from xb_muscle_ros.tables import Filled, aligned, number, write_csv
@@ -122,8 +123,8 @@ def ended(runs: Sequence[ModelRuns]) -> list[str]:
 
 def stance_tree(body: Body, stance: Stance) -> dict[str, Any]:
     """The stance as plain data; the body is put there."""
-    body.place(stance.qpos)
-    body.mj.mj_forward(body.model, body.data)
+    # Contact forces of a body at rest, whatever its muscles do now.
+    demand(body, stance.qpos)
     names = [body.model.joint(i).name for i in range(1, body.model.njnt)]
     at = body.model.jnt_qposadr[1:]
     reactions = body.contact_forces_n()
