@@ -63,7 +63,7 @@ def test_knee_is_run_with_and_without_movement(tmp_path: Path, monkeypatch: pyte
         (["--displacement", "nan"], "platform's displacement is nan"),
         (["--live"], "give one --model"),
         (["--live", "--model", "mujoco"], "give one --model"),
-        (["--scene", "knee", "--speed", "1"], "are of the scene ankle; drop them"),
+        (["--scene", "knee", "--speed", "1"], "are of the scenes ankle and myolegs; drop them"),
     ],
 )
 def test_wrong_options(arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

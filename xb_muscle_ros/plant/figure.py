@@ -13,7 +13,7 @@ from xb_muscle_ros.plant.report import rows
 from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, SHADE, THIRD, figure, save
 
 _FIRST_S = 0.1
-_LOOKS: tuple[dict[str, Any], ...] = (
+LOOKS: tuple[dict[str, Any], ...] = (
     {"color": MODEL, "linestyle": "-", "linewidth": 1.6},
     {"color": SECOND, "linestyle": (0, (5, 1.5)), "linewidth": 1.4},
     {"color": THIRD, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 1.4},
@@ -74,8 +74,7 @@ def _looks(traces: Sequence[Trace]) -> list[dict[str, Any]]:
     """One line for each model; a run that was moved before has its model's line, with markers."""
     models = list(dict.fromkeys(trace.model for trace in traces))
     return [
-        {**_LOOKS[models.index(trace.model) % len(_LOOKS)], **(_MOVED if trace.moved_before else {})}
-        for trace in traces
+        {**LOOKS[models.index(trace.model) % len(LOOKS)], **(_MOVED if trace.moved_before else {})} for trace in traces
     ]
 
 
