@@ -12,6 +12,7 @@ from xb_muscle_ros.errors import UserError
 
 if TYPE_CHECKING:
     from xb_muscle_ros.models.fibre_file import Fibre
+    from xb_muscle_ros.plant.reflex import Reflex
 
 _MODELS = ("3state_coop", "hill_se", "hill", "mujoco")
 DESCRIPTION = (
@@ -41,6 +42,45 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ankle.add_argument("--displacement", type=float, metavar="M", help="way, m (default -0.075: backwards)")
     ankle.add_argument("--speed", type=float, metavar="M_PER_S", help="speed, m/s (default 0.2)")
     ankle.add_argument("--acceleration", type=float, metavar="M_PER_S2", help="acceleration, m/s² (default 2)")
+    _add_reflex(parser)
+
+
+_REFLEX = (
+    ("length_per_l0", "PER_L0", "excitation (0 to 1) per L0 of stretch since the start"),
+    ("velocity_s_per_l0", "S_PER_L0", "excitation per L0/s of lengthening"),
+    ("force_per_f0", "PER_F0", "excitation per F0 of force above that of the start"),
+    ("delay_s", "S", "from fibre to excitation, whole ticks (default 0.04)"),
+    ("length_threshold_l0", "L0", "stretch below which length has no effect (default 0)"),
+    ("velocity_threshold_l0_per_s", "L0_PER_S", "velocity below which it has no effect (default 0)"),
+)
+
+
+def _add_reflex(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("stretch reflex; off unless one of the first three is given")
+    for name, unit, meaning in _REFLEX:
+        option = f"--reflex-{name.replace('_', '-')}"
+        group.add_argument(option, dest=f"reflex_{name}", type=float, metavar=unit, help=meaning)
+    group.add_argument(
+        "--reflex-muscle", dest="reflex_muscles", metavar="NAME", action="append",
+        help="name or pattern of muscles that have it (may be given again; default: all)",
+    )  # fmt: skip
+
+
+def _reflex(arguments: argparse.Namespace) -> Reflex:
+    """The reflex asked for; none by default.
+
+    Raises:
+        UserError: a number out of range, or a delay without a gain.
+    """
+    from xb_muscle_ros.plant.reflex import Reflex
+
+    given = {name: getattr(arguments, f"reflex_{name}") for name, _, _ in _REFLEX}
+    values = {name: value for name, value in given.items() if value is not None}
+    muscles = tuple(arguments.reflex_muscles or ())
+    reflex = Reflex(**values, muscles=muscles)
+    if (values or muscles) and not reflex.works:
+        raise UserError("the reflex has no gain above 0; give --reflex-length-per-l0 or another, or drop the others")
+    return reflex
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -49,6 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.plant.figure import draw_loop
     from xb_muscle_ros.plant.loop import DURATION_S, Muscles, in_process, run_ankle, run_knee
     from xb_muscle_ros.plant.plant import Plant
+    from xb_muscle_ros.plant.reflex import NO_REFLEX
     from xb_muscle_ros.plant.report import table, write
     from xb_muscle_ros.plant.translation import RampAndHold
     from xb_muscle_ros.progress import Progress
@@ -70,11 +111,17 @@ def run(arguments: argparse.Namespace) -> int:
     if scene != "ankle" and given:
         raise UserError("--displacement, --speed and --acceleration are of the scene ankle; drop them")
     platform = RampAndHold(**given)
+    reflex = _reflex(arguments)
     # Before any model is compiled: is there an engine at all?
     plant = Plant(scene)
     settings: dict[str, object] = {"mujoco": plant.version, "tick_s": plant.tick_s, "duration_s": duration}
     settings["live"] = arguments.live
     settings["tendon"] = "elastic" if elastic else "rigid"
+    reflexes = [NO_REFLEX]
+    if reflex.works:
+        # Each model without it and with it: what it does is the difference.
+        settings["reflex"] = vars(reflex)
+        reflexes.append(reflex)
     fibres = _fibres(arguments.fiber, arguments.models)
     muscles: Muscles = in_process
     if arguments.live:
@@ -84,15 +131,20 @@ def run(arguments: argparse.Namespace) -> int:
         muscles = over_ros()
     if scene == "ankle":
         settings["platform"] = vars(platform)
-        runs = [functools.partial(run_ankle, fibre, platform, duration, elastic, muscles) for fibre in fibres]
+        runs = [
+            functools.partial(run_ankle, fibre, platform, duration, elastic, muscles, each)
+            for fibre, each in itertools.product(fibres, reflexes)
+        ]
         way = "backwards" if platform.displacement_m < 0.0 else "forwards"
         title = (
             f"Platform moves {100 * abs(platform.displacement_m):g} cm {way}, {platform.speed_m_per_s:g} m/s, "
             f"{platform.acceleration_m_per_s2:g} m/s²"
         )
     else:
-        both = itertools.product((False, True), fibres)
-        runs = [functools.partial(run_knee, fibre, moved, duration, elastic, muscles) for moved, fibre in both]
+        runs = [
+            functools.partial(run_knee, fibre, moved, duration, elastic, muscles, each)
+            for moved, fibre, each in itertools.product((False, True), fibres, reflexes)
+        ]
         title = "Leg released from level"
     traces = []
     with Progress(len(runs), "loop") as progress:
@@ -100,13 +152,14 @@ def run(arguments: argparse.Namespace) -> int:
             traces.append(run_one())
             progress.update()
     for trace in traces:
-        if said := trace.beyond:
+        if said := trace.remark:
             common.warn(said)
     print(table(traces))
-    draw_loop(arguments.out / "loop.png", traces, f"{title}; {settings['tendon']} tendons")
+    how = f"{title}; {settings['tendon']} tendons" + (f"; {reflex.words}" if reflex.works else "")
+    draw_loop(arguments.out / "loop.png", traces, how)
     for path in [*write(arguments.out, traces, settings), arguments.out / "loop.png"]:
         print(path)
-    return 0
+    return 2 if any(trace.ended for trace in traces) else 0
 
 
 def _fibres(name: str, models: list[str] | None) -> list[Fibre | None]:

@@ -10,6 +10,8 @@ from typing import Any
 
 import yaml
 
+from xb_muscle_ros import fast_yaml
+
 _BELOW = "ros__parameters"
 
 

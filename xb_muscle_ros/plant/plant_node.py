@@ -25,11 +25,20 @@ def main() -> None:
 def _play(arguments: list[str], stop: program.Stop) -> None:
     import rclpy
 
+    from xb_muscle_ros.models.fibre_file import load_fibre
+    from xb_muscle_ros.plant.body import Body
     from xb_muscle_ros.plant.episodes import Episodes
+    from xb_muscle_ros.plant.plant_parameters import read, reflex_of
+    from xb_muscle_ros.plant.translation import RampAndHold
 
     del arguments
     make = functools.partial(rclpy.create_node, "plant_node", automatically_declare_parameters_from_overrides=True)
-    plant = Episodes(program.created(make), stop)
+    node = program.created(make)
+    given = read(node)
+    platform = RampAndHold(given["displacement_m"], given["speed_m_per_s"], given["acceleration_m_per_s2"])
+    fibre = load_fibre(given["fiber_file"], given["model"])
+    body = Body(given["scene"], fibre, platform, given["elastic_tendon"], reflex_of(given))
+    plant = Episodes(node, body, given, stop)
     try:
         plant.run()
     finally:

@@ -1,0 +1,79 @@
+"""What a body tells the graph of itself: its joints, and how its episodes go."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from sensor_msgs.msg import JointState
+
+from xb_muscle_ros.node.outputs import set_stamp
+from xb_muscle_ros.plant.body import MovedBody
+
+_EVERY_S = 1.0
+
+
+class Outlets:
+    """Publishes ``plant/joint``, and a status called ``<node>: episode`` in ``/diagnostics``.
+
+    The status is at level OK while an episode is played or was played to its end, at WARN while the body waits, at
+    ERROR where an episode ended before its time; ``message`` says why, and ``state`` is the body's last one.
+    """
+
+    def __init__(self, node: Any, body: MovedBody) -> None:
+        """Join the topics.
+
+        Args:
+            node: of rclpy.
+            body: that is told of.
+        """
+        self._body = body
+        self._clock = node.get_clock()
+        self._name = f"{node.get_fully_qualified_name().lstrip('/')}: episode"
+        self._to_joint = node.create_publisher(JointState, "plant/joint", 100)
+        self._joint = JointState(name=list(body.joints.names))
+        self._to_diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._said_s = -_EVERY_S
+        self._last = ("", "")
+        self.early = 0
+
+    def show(self, stamp: int) -> None:
+        """Publish the joints; stamp in ns."""
+        joint, joints = self._joint, self._body.joints
+        set_stamp(joint, stamp)
+        joint.position, joint.velocity = joints.angle_rad, joints.velocity_rad_per_s
+        joint.effort = joints.torque_nm
+        self._to_joint.publish(joint)
+
+    def playing(self, episode: int) -> None:
+        """Say, once a second, that an episode goes on."""
+        self._say(DiagnosticStatus.OK, "playing", episode)
+
+    def waiting(self, episode: int, why: str) -> None:
+        """Say, once a second and where the reason changes, what is waited for."""
+        self._say(DiagnosticStatus.WARN, f"waiting: {why}", episode)
+
+    def ended(self, episode: int, why: str = "") -> None:
+        """Say that an episode ended; `why` if before its time."""
+        self.early += bool(why)
+        self._said_s = -_EVERY_S
+        self._say(DiagnosticStatus.ERROR if why else DiagnosticStatus.OK, why or "played to its end", episode)
+
+    def _say(self, level: bytes, message: str, episode: int) -> None:
+        now = time.monotonic()
+        if self._last == (message, str(episode)) and now - self._said_s < _EVERY_S:
+            return
+        self._said_s, self._last = now, (message, str(episode))
+        values = {"episode": episode, "ended before their time": self.early, "state": self._body.state}
+        status = DiagnosticStatus(
+            level=level,
+            name=self._name,
+            message=message,
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )
+        array = DiagnosticArray(status=[status])
+        set_stamp(array, int(self._clock.now().nanoseconds))
+        self._to_diagnostics.publish(array)
