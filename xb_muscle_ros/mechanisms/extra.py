@@ -18,6 +18,7 @@ class Needs(enum.Enum):
     NOTHING = "nothing"
     HEADS = "heads that attach and detach"
     SUPER_RELAXED = "super-relaxed heads"
+    SEPARATE_LENGTHS = "a series element whose length does not follow from the heads' force"
 
 
 class Moments(NamedTuple):
@@ -37,10 +38,13 @@ class Extra(Mechanism):
 
     Class attributes:
         needs: what the model must have.
+        geometry: it describes how a muscle is built, which is measured and not missing: no diagnosis looks for it, no
+            fit moves its parameters unasked, and it has no `entry`.
     """
 
     family = Family.EXTRA
     needs: ClassVar[Needs] = Needs.NOTHING
+    geometry: ClassVar[bool] = False
 
     def force(self, q: Quantities) -> Expr:
         """Force beside the contractile and the parallel element, F0."""
@@ -53,6 +57,15 @@ class Extra(Mechanism):
     def inner_kinetics(self, q: Quantities) -> tuple[Expr, Expr]:
         """Rate of that force at constant length, 1/s, and its stiffness per power stroke."""
         return 0, 0
+
+    def force_share(self, q: Quantities) -> tuple[Expr, Expr]:
+        """Share of the heads' force that is borne at ``q.sarcomere_change``, and its change per L0 of that length."""
+        return 1, 0
+
+    @property
+    def limits_force(self) -> bool:
+        """Whether it has a `force_share` of its own."""
+        return type(self).force_share is not Extra.force_share
 
     def modified(self, q: Quantities) -> Values:
         """Other values for parameters and inputs, by name; the model's blocks see these in place of their own."""
@@ -110,6 +123,10 @@ class InSeries(Extra):
 
     PREFIX: ClassVar[str] = "other_"
     needs = Needs.HEADS
+
+    @abstractmethod
+    def apart(self, q: Quantities) -> Expr:
+        """By how much the model's own half-sarcomere is longer than their mean, power strokes."""
 
     @abstractmethod
     def chain(self, q: Quantities, own: Unit, other: Unit) -> Chain:

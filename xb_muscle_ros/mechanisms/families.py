@@ -102,6 +102,11 @@ class Series(Mechanism):
     family = Family.SERIES
     length_states: ClassVar[tuple[State, ...]] = ()
 
+    @property
+    def follows_force(self) -> bool:
+        """Whether its length is known from the cross-bridges' force alone."""
+        return any(state not in self.states for state in self.length_states)
+
     @abstractmethod
     def ce_velocity(self, q: Quantities) -> Expr:
         """Velocity u of the contractile element, power strokes/s.

@@ -100,15 +100,23 @@ def rates(model: Composition, q: Quantities) -> Parts:
     q = q.for_block("composition", **shown)
     others = dict(own.others)
     chain: Chain | None = None
-    unit = own.unit
-    if model.in_series is not None:
+    if model.in_series is None:
+        unit = _shared(model, own.unit, q)
+    else:
         mine = q.for_block(model.in_series.name)
         values = {name: getattr(q, row.name) for row, name in other_states(model)}
         other = _heads(model, Gaussian(), _modified(model, q.for_block("composition", **values)))
-        chain = model.in_series.chain(mine, own.unit, other.unit)
+        apart = model.in_series.apart(mine) / q.gamma
+        chain = model.in_series.chain(
+            mine, _shared(model, own.unit, _longer(q, apart)), _shared(model, other.unit, _longer(q, -apart))
+        )
         unit = Unit(chain.force, chain.force_rate, chain.stiffness)
     for extra in model.extras:
         unit = _with_inner(unit, extra, q.for_block(extra.name))
+    if any(extra.limits_force for extra in model.extras):
+        # Close to where a falling limb ends the share falls faster than heads are stiff. Alone they would give way
+        # without end; the series element, which is held to the same force, then settles how fast.
+        unit = unit._replace(stiffness=ops.positive(unit.stiffness))
     q = q.for_block(
         model.series.name, force_xb=unit.force, kinetic_force_rate=unit.force_rate, stiffness_xb=unit.stiffness
     )
@@ -122,6 +130,20 @@ def rates(model: Composition, q: Quantities) -> Parts:
     for extra in model.extras:
         others.update(extra.derivatives(q.for_block(extra.name)))
     return Parts(own.kinetics, others, own.ways, own_velocity, _outputs(model, q))
+
+
+def _shared(model: Composition, unit: Unit, q: Quantities) -> Unit:
+    """What of the heads' force is borne at a length: by the product rule the share's slope is a stiffness too."""
+    for extra in model.extras:
+        share, slope = extra.force_share(q.for_block(extra.name))
+        stiffness = share * unit.stiffness + slope * unit.force / q.gamma
+        unit = Unit(share * unit.force, share * unit.force_rate, stiffness)
+    return unit
+
+
+def _longer(q: Quantities, by: Expr) -> Quantities:
+    """The same at another length of the half-sarcomeres, L0."""
+    return q.for_block("composition", sarcomere_change=q.sarcomere_change + by)
 
 
 def _with_inner(unit: Unit, extra: Extra, q: Quantities) -> Unit:
@@ -151,6 +173,8 @@ def _sarcomere_change(model: Composition, q: Quantities) -> Expr:
 
     Of a chain of two, the force of the model's own heads counts.
     """
+    if not model.series.follows_force:
+        return q.length_change - model.series.extension(q.for_block(model.series.name)) / q.gamma
     force = _borne(model, q, _moments(q)) + sum(extra.inner_force(q.for_block(extra.name)) for extra in model.extras)
     extension = model.series.extension(q.for_block(model.series.name, force_xb=force))
     return q.length_change - extension / q.gamma

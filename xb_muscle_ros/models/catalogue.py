@@ -15,12 +15,12 @@ from xb_muscle_ros.models.registry import EXTRAS, SEPARATOR, SWAPS
 CATALOGUE: Mapping[str, Entry] = MappingProxyType(
     {name: replace(b.entry, name=name) for name, b in {**SWAPS, **EXTRAS}.items() if b.entry is not None}
 )
-"""The entry of every mechanism of the registry by name, family by family."""
+"""The entry of every mechanism of the registry by name, family by family; those that are geometry have none."""
 
 
 def mechanisms_of(name: str) -> tuple[Entry, ...]:
-    """Mechanisms that a model or set has beside those of the model before the first ``+``."""
-    return tuple(CATALOGUE[part] for part in name.split(SEPARATOR)[1:])
+    """Mechanisms that a model or set has beside those of the model before the first ``+``; geometry is none."""
+    return tuple(CATALOGUE[part] for part in name.split(SEPARATOR)[1:] if part in CATALOGUE)
 
 
 def swapped_in(name: str) -> tuple[Entry, ...]:

@@ -32,6 +32,7 @@ _EXACT = 1e-9
 _STATES = 6
 # For slopes by central differences.
 _STEP_S = 1e-6
+_STEP_L0 = 1e-6
 
 
 def refuse_incomplete(blocks: Sequence[Block]) -> None:
@@ -80,7 +81,10 @@ def _lacking(block: Block) -> Iterator[str]:
     missing = sorted(getattr(block, "__abstractmethods__", ()))
     if missing:
         yield f"hook '{missing[0]}' of its family is missing; define it (docs/mechanisms.md says what it returns)"
-    if block.family is Family.EXTRA and block.entry is None:
+    geometry = issubclass(block, Extra) and block.geometry
+    if geometry and block.entry is not None:
+        yield "it says geometry = True and has an entry; what no diagnosis looks for has none: leave one of them out"
+    if block.family is Family.EXTRA and block.entry is None and not geometry:
         yield "it has no entry; add entry = Entry(family=..., title=..., meaning=..., effect=..., size=..., starts=...)"
     if issubclass(block, Extra) and not isinstance(block.needs, Needs):
         yield f"needs is {block.needs!r}; allowed are {', '.join(str(n) for n in Needs)}"
@@ -172,19 +176,18 @@ def refuse_wrong(block: Block, models: Sequence[tuple[Model, Model]]) -> None:
         UserError: names mechanism, file, what is amiss and the remedy.
     """
     where, entry = place(block), block.entry
-    assert entry is not None
     if not models:
         raise UserError(f"{where}: it goes with no model; see 'needs' and the families in docs/mechanisms.md")
     acts = False
     for without, model in models:
         usual = {row.name: min(max(1.0, row.lower), row.upper) for row in (*without.parameters, *model.parameters)}
         usual |= {row.name: row.default for row in model.parameters if row.default is not None}
-        started = usual | dict(entry.starting_values(usual)[0])
+        started = usual | (dict(entry.starting_values(usual)[0]) if entry else {})
         for state in _some_states(without, model):
             base, on = (_evaluated(where, m, started | state) for m in (without, model))
             acts = acts or any(on[name] != value for name, value in base.items() if name in on)
             _refuse_untrue(where, block, started | state)
-            if entry.frame or block.family is not Family.EXTRA:
+            if entry is None or entry.frame or block.family is not Family.EXTRA:
                 continue
             # Its own states stay at rest where they do not move; others may be anywhere.
             rest = dict(block().rest(Quantities(started, block.name, None)))
@@ -202,19 +205,24 @@ def refuse_wrong(block: Block, models: Sequence[tuple[Model, Model]]) -> None:
 
 
 def _refuse_untrue(where: str, block: Block, values: Mapping[str, float]) -> None:
-    """Refuse kinetics of an inner force that are not those of its states: steps would go wrong without a word."""
-    hooks = ("inner_force", "inner_kinetics")
-    if not issubclass(block, Extra) or all(getattr(block, hook) is getattr(Extra, hook) for hook in hooks):
+    """Refuse slopes that are not those of what they belong to: steps would go wrong without a word."""
+    if not issubclass(block, Extra):
         return
     extra = block()
+    _refuse_untrue_share(where, extra, values)
+    hooks = ("inner_force", "inner_kinetics")
+    if all(getattr(block, hook) is getattr(Extra, hook) for hook in hooks):
+        return
 
     def of(hook: str, at: Mapping[str, float]) -> Any:
         return getattr(extra, hook)(Quantities(at, block.name, None))
 
+    values = {**values, "sarcomere_change": values["length_change"]}
     for velocity in (0.0, 5.0):
         at = {**values, "ce_velocity": velocity}
         try:
-            rates, (rate, stiffness) = of("derivatives", at), of("inner_kinetics", values)
+            rates, (rate, stiffness) = dict(of("derivatives", at)), of("inner_kinetics", values)
+            rates["sarcomere_change"] = velocity / values["gamma"]
             ahead, behind = ({**at, **{n: at[n] + h * r for n, r in rates.items()}} for h in (_STEP_S, -_STEP_S))
             found = (of("inner_force", ahead) - of("inner_force", behind)) / (2.0 * _STEP_S)
         except AttributeError:
@@ -226,6 +234,30 @@ def _refuse_untrue(where: str, block: Block, values: Mapping[str, float]) -> Non
                 f"{where}: at a ce_velocity of {velocity:g} power strokes/s its states change inner_force by "
                 f"{found:.6g} 1/s, by inner_kinetics it is {told:.6g}; return the rate at constant length and the "
                 "change per power stroke, of a state that follows ce_velocity"
+            )
+
+
+def _refuse_untrue_share(where: str, extra: Extra, values: Mapping[str, float]) -> None:
+    """Refuse a share of force whose slope is another one's, or that is no share."""
+    if not extra.limits_force:
+        return
+    # A change with anything else would have no place in the force balance.
+    known = {row.name: values[row.name] for row in (*extra.parameters, *COMMON)}
+    for length in (-0.4, -0.2, -0.05, 0.03, 0.15, 0.35, 0.5):
+        try:
+            (behind, _), (share, told), (ahead, _) = (
+                extra.force_share(Quantities({**known, "sarcomere_change": length + by}, extra.name, None))
+                for by in (-_STEP_L0, 0.0, _STEP_L0)
+            )
+        except AttributeError as error:
+            raise UserError(f"{where}: {error}; force_share may ask for sarcomere_change and parameters") from error
+        found = (ahead - behind) / (2.0 * _STEP_L0)
+        if not -_EXACT <= share <= 1.0 + _EXACT:
+            raise UserError(f"{where}: at a sarcomere_change of {length:g} L0 force_share is {share:.6g}; give 0 to 1")
+        if not math.isclose(found, told, rel_tol=1e-4, abs_tol=1e-4):
+            raise UserError(
+                f"{where}: at a sarcomere_change of {length:g} L0 force_share changes by {found:.6g} per L0, by its "
+                f"second value it is {told:.6g}; return the slope of the first"
             )
 
 

@@ -16,8 +16,13 @@ from xb_muscle_ros.mechanisms import (
     Quantities,
     Series,
     State,
+    ops,
 )
 from xb_muscle_ros.models.composition import OUTPUTS, Equations, Model
+
+# Least strength by which a force is divided, as a share of all heads' force: where a length has no active force a
+# series element at rest still finds 0.01 % of it. With less, passive force would move it faster than steps resolve.
+_LEAST = 1e-4
 
 
 @dataclass(frozen=True)
@@ -57,11 +62,7 @@ class Hill(Model):
         level = self.activation.level(q.for_block(self.activation.name))
         for extra in self.extras:
             level = level * extra.overlap(q.for_block(extra.name))
-        of_relation = q.for_block(self.force_velocity.name)
-        element = Contractile(
-            force_at=lambda velocity: level * self.force_velocity.force(of_relation, velocity),
-            velocity_at=lambda force: self.force_velocity.velocity(of_relation, force / level),
-        )
+        element = self._element(q, plain, level)
         balance = self.series.balance(q.for_block(self.series.name), element)
         rates = {**self.activation.derivatives(q.for_block(self.activation.name)), **balance.derivatives}
         force_ce = q.Fscale * balance.force
@@ -79,6 +80,21 @@ class Hill(Model):
             "n_on": level,
         }
         return rates, balance.ce_velocity, shown
+
+    def _element(self, q: Quantities, plain: Quantities, level: Expr) -> Contractile:
+        """The relation, as strong as activation and length make it, and beside it what bears force within."""
+        strength, inner = level, 0
+        for extra in self.extras:
+            strength = strength * extra.force_share(plain.for_block(extra.name))[0]
+            inner = inner + extra.inner_force(plain.for_block(extra.name, available_sites=level))
+        divisor = level
+        if any(extra.limits_force for extra in self.extras):
+            divisor = _LEAST + ops.positive(strength - _LEAST)
+        relation = q.for_block(self.force_velocity.name)
+        return Contractile(
+            force_at=lambda velocity: strength * self.force_velocity.force(relation, velocity) + inner,
+            velocity_at=lambda force: self.force_velocity.velocity(relation, (force - inner) / divisor),
+        )
 
     def evaluated(self, values: Mapping[str, float]) -> dict[str, float]:
         rates, velocity, shown = self._written(values)

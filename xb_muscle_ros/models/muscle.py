@@ -29,7 +29,6 @@ _ON_THE_WAY = 1e-4
 # Compiled modules that have taken a step in this process.
 _WARM: set[Any] = set()
 
-
 # Remedies by result code of the compiled loops.
 _REMEDIES = (
     "",
@@ -122,8 +121,7 @@ class Muscle:
         if duration_s is not None:
             return self.hold(state, calcium_um, duration_s)
         rates = np.zeros(self._n - 3)
-        quick = self._settled_quickly(state, calcium_um, rates)
-        if quick is not None:
+        if (quick := self._settled_quickly(state, calcium_um, rates)) is not None:
             return quick
         chunk, total = 1.0, 0.0
         # Fixed steps cost time by the second of muscle time, variable ones hardly any.
@@ -148,18 +146,21 @@ class Muscle:
         """
         if self._settling.step_s is not None or self.fibre.values["smoothing"] > 0.0:
             return None
-        try:
-            length = float(state[-3])
-            # A step that is a tiny share of what is to come counts as stuck, so the first second goes by itself.
-            found = self._advance(state, length, calcium_um, 1.0, 1e-6, _ON_THE_WAY)
-            found = self._advance(found, length, calcium_um, _LONGEST_SETTLING_S, 0.1, _ON_THE_WAY)
-            # The last step was long, so what it has left of an error is gone after one more.
-            found = self._advance(found, length, calcium_um, _LONGEST_SETTLING_S, _LONGEST_SETTLING_S, _ON_THE_WAY)
-        except UserError:
-            return None
-        self.code.slope(found, 0.0, calcium_um, self.parameters, rates)
-        inside = self.code.violation(found, self.parameters, 1e-9) < 0
-        return found if inside and np.max(np.abs(rates), initial=0.0) < self._settling.rate else None
+        # A step that is a tiny share of what is to come counts as stuck, so the first second goes by itself, and if need
+        # be the first millisecond (passive force, hardly a head). What a long step leaves of an error goes in one more.
+        steps = ((1.0, 1e-6), (_LONGEST_SETTLING_S, 0.1), (_LONGEST_SETTLING_S, _LONGEST_SETTLING_S))
+        for durations in (steps, ((1e-3, 1e-6), *steps)):
+            found = state
+            try:
+                for dt, h in durations:
+                    found = self._advance(found, float(state[-3]), calcium_um, dt, h, _ON_THE_WAY)
+            except UserError:
+                continue
+            self.code.slope(found, 0.0, calcium_um, self.parameters, rates)
+            inside = self.code.violation(found, self.parameters, 1e-9) < 0
+            if inside and np.max(np.abs(rates), initial=0.0) < self._settling.rate:
+                return found
+        return None
 
     def step(self, state: Array, length_change_l0: float, calcium_um: float, dt_s: float) -> Array:
         """State `dt_s` later: length moves linearly to `length_change_l0` (L0), calcium (µM) is held.

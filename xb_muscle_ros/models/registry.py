@@ -19,7 +19,7 @@ from xb_muscle_ros.distribution.base import Representation
 from xb_muscle_ros.distribution.gaussian import Gaussian
 from xb_muscle_ros.distribution.grid import Characteristics, ConservativeFixedGrid, FixedGrid
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.mechanisms import Extra, InSeries, Mechanism, Needs, discovery
+from xb_muscle_ros.mechanisms import Extra, InSeries, Mechanism, Needs, Series, discovery
 from xb_muscle_ros.models import checking
 from xb_muscle_ros.models.composition import Composition, Model
 from xb_muscle_ros.models.hill import Hill
@@ -55,9 +55,14 @@ class Row:
     @property
     def has(self) -> frozenset[Needs]:
         """What mechanisms can act on."""
-        thick = self.blocks.get("thick_filament")
-        heads = {Needs.HEADS} if thick else set()
-        return frozenset({Needs.NOTHING} | heads | ({Needs.SUPER_RELAXED} if thick and thick.states else set()))
+        thick, series = self.blocks.get("thick_filament"), self.blocks["series"]()
+        found = {
+            Needs.NOTHING: True,
+            Needs.HEADS: thick is not None,
+            Needs.SUPER_RELAXED: thick is not None and bool(thick.states),
+            Needs.SEPARATE_LENGTHS: thick is None or (isinstance(series, Series) and not series.follows_force),
+        }
+        return frozenset(need for need, there in found.items() if there)
 
     def with_block(self, block: type[Mechanism]) -> Row:
         """The row with another block of a family that it has."""
@@ -143,10 +148,8 @@ def _with_mechanism(row: Row, name: str, taken: dict[str, str], where: str) -> R
         extra = EXTRAS[name]
         if extra in row.extras:
             raise UserError(f"{where}: mechanism '{name}' is named twice; name it once")
-        if extra.needs not in row.has:
-            raise UserError(f"{where}: mechanism '{name}' needs {extra.needs.value}, which this model does not have")
         _take(place_of(name), name, taken, where)
-        return replace(row, extras=(*row.extras, extra))
+        return _met(replace(row, extras=(*row.extras, extra)), where)
     if name not in SWAPS:
         told = f"{where}: mechanism '{name}' is not known{suggest(name, (*EXTRAS, *SWAPS))}"
         if not any(discovery.is_outside(block) for block in BLOCKS):
@@ -160,13 +163,33 @@ def _with_mechanism(row: Row, name: str, taken: dict[str, str], where: str) -> R
     if row.blocks[slot] is block:
         raise UserError(f"{where}: mechanism '{name}' is part of this model already; leave it out")
     _take(place_of(name), name, taken, where)
-    return row.with_block(block)
+    return _met(row.with_block(block), where)
+
+
+def _met(row: Row, where: str) -> Row:
+    """The row, if it has what its mechanisms need.
+
+    Raises:
+        UserError: names the mechanism, the need, and variants of the model that have it.
+    """
+    for extra in row.extras:
+        if extra.needs in row.has:
+            continue
+        told = f"{where}: mechanism '{extra.name}' needs {extra.needs.value}, which this model does not have"
+        alike = [name for name, other in MODELS.items() if extra.needs in other.has and _but_for_series(other, row)]
+        raise UserError(f"{told}; take {' or '.join(alike)} in its place" if alike else told)
+    return row
 
 
 def _take(place: str, name: str, taken: dict[str, str], where: str) -> None:
     if place and place in taken:
         raise UserError(f"{where}: mechanisms '{taken[place]}' and '{name}' take the same place; name one of them")
     taken[place] = name
+
+
+def _but_for_series(one: Row, other: Row) -> bool:
+    first, second = ({**row.blocks, "series": None} for row in (one, other))
+    return first == second
 
 
 @functools.cache

@@ -33,6 +33,9 @@ class HalfSarcomereSpread(InSeries):
         reach=6.0, frame=True,
     )  # fmt: skip
 
+    def apart(self, q: Quantities) -> Expr:
+        return q.hs_difference / 2
+
     def chain(self, q: Quantities, own: Unit, other: Unit) -> Chain:
         strong, weak = 1 + q.hs_spread, 1 - q.hs_spread
         tie = q.hs_stiffness * q.hs_difference / 2
