@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -34,6 +34,7 @@ class MovedBody(Protocol):
         tick_s: length of one tick.
         tick: how many were played since the start.
         reflexive: whether calcium changes.
+        model, data: MuJoCo's, for viewers.
     """
 
     muscles: Sequence[Architecture]
@@ -41,6 +42,8 @@ class MovedBody(Protocol):
     tick_s: float
     tick: int
     reflexive: bool
+    model: Any
+    data: Any
 
     def restart(self) -> None:
         """Back to the start, at rest."""
@@ -61,8 +64,8 @@ class MovedBody(Protocol):
         """
 
     @property
-    def beyond(self) -> str:
-        """Why no muscle can follow the body any further; empty where all can."""
+    def over(self) -> str:
+        """Why the body cannot go on, with the remedy; empty where it can."""
 
     @property
     def state(self) -> str:
@@ -106,6 +109,7 @@ class Body:
         self._elastic = elastic
         self._of_reflex = reflex
         self.reflexive = reflex.works
+        self.model, self.data = plant.engine
         self.restart()
 
     def restart(self) -> None:
@@ -136,9 +140,11 @@ class Body:
         return [*enumerate((self._calcium_um, *coming), max(self.tick - 1, 0))]
 
     @property
-    def beyond(self) -> str:
+    def over(self) -> str:
         """Which muscle's fibre is asked for a length that no fibre has; empty where none is."""
-        return beyond([muscle.name for muscle in self.muscles], self.length_l0)
+        said = beyond([muscle.name for muscle in self.muscles], self.length_l0)
+        remedy = "so no muscle can answer; take a shorter duration_s or a gentler movement of the platform"
+        return f"{said}, {remedy}" if said else ""
 
     @property
     def state(self) -> str:

@@ -53,7 +53,7 @@ class Episodes:
         self._link = Link(node=node)
         self._link.stop = stop
         self._end = MuscleEnd(self._link, body.muscles, body.fibres, self._mode)
-        self._outlets = Outlets(node, body)
+        self._outlets = Outlets(node, body, given["display_hz"])
         self._said = ""
         self._played = 0
         # Of the realtime thread: ticks until the muscles have settled, whether the body waits for force, what failed.
@@ -94,19 +94,14 @@ class Episodes:
         """Leave the graph."""
         self._link.close()
 
-    def _check_reach(self) -> None:
-        if said := self._body.beyond:
-            raise _EpisodeOver(
-                f"{said}, so no muscle can answer; take a shorter duration_s or a gentler movement of the platform"
-            )
-
     def _advance(self, force: Any) -> None:
         """Go on by one tick."""
         try:
             self._body.advance(force)
         except UserError as error:
             raise _EpisodeOver(str(error)) from error
-        self._check_reach()
+        if said := self._body.over:
+            raise _EpisodeOver(said)
 
     def _insist(self, act: Callable[[], Any]) -> Any:
         """Result of something that a muscle node must be there for, tried until it is; None where told to stop.

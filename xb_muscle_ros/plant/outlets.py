@@ -12,26 +12,32 @@ from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.node.outputs import set_stamp
 from xb_muscle_ros.plant.body import MovedBody
+from xb_muscle_ros.plant.display import Display
 
 _EVERY_S = 1.0
 
 
 class Outlets:
-    """Publishes ``plant/joint``, and a status called ``<node>: episode`` in ``/diagnostics``.
+    """Publishes ``plant/joint``, for viewers what `Display` has, and in ``/diagnostics`` a status ``<node>: episode``.
 
     The status is at level OK while an episode is played or was played to its end, at WARN while the body waits, at
-    ERROR where an episode ended before its time; ``message`` says why, and ``state`` is the body's last one.
+    ERROR where an episode ended before its time; ``message`` says why, and ``state`` is the body's last one. What the
+    last early end was is in ``last early end`` from then on, for who looks once a second.
     """
 
-    def __init__(self, node: Any, body: MovedBody) -> None:
+    def __init__(self, node: Any, body: MovedBody, display_hz: float) -> None:
         """Join the topics.
 
         Args:
             node: of rclpy.
             body: that is told of.
+            display_hz: how often viewers are served, by the stamps; 0: not at all.
         """
         self._body = body
         self._clock = node.get_clock()
+        self._display = Display(node, body.model, body.data) if display_hz else None
+        self._shown_every = round(1e9 / display_hz) if display_hz else 0
+        self._shown = -1
         self._name = f"{node.get_fully_qualified_name().lstrip('/')}: episode"
         self._to_joint = node.create_publisher(JointState, "plant/joint", 100)
         self._joint = JointState(name=list(body.joints.names))
@@ -39,6 +45,7 @@ class Outlets:
         self._said_s = -_EVERY_S
         self._last = ("", "")
         self.early = 0
+        self._why = ""
 
     def show(self, stamp: int) -> None:
         """Publish the joints; stamp in ns."""
@@ -47,6 +54,9 @@ class Outlets:
         joint.position, joint.velocity = joints.angle_rad, joints.velocity_rad_per_s
         joint.effort = joints.torque_nm
         self._to_joint.publish(joint)
+        if self._display is not None and stamp // self._shown_every != self._shown:
+            self._shown = stamp // self._shown_every
+            self._display.show(stamp)
 
     def playing(self, episode: int) -> None:
         """Say, once a second, that an episode goes on."""
@@ -59,6 +69,7 @@ class Outlets:
     def ended(self, episode: int, why: str = "") -> None:
         """Say that an episode ended; `why` if before its time."""
         self.early += bool(why)
+        self._why = why or self._why
         self._said_s = -_EVERY_S
         self._say(DiagnosticStatus.ERROR if why else DiagnosticStatus.OK, why or "played to its end", episode)
 
@@ -67,7 +78,12 @@ class Outlets:
         if self._last == (message, str(episode)) and now - self._said_s < _EVERY_S:
             return
         self._said_s, self._last = now, (message, str(episode))
-        values = {"episode": episode, "ended before their time": self.early, "state": self._body.state}
+        values = {
+            "episode": episode,
+            "ended before their time": self.early,
+            "last early end": self._why,
+            "state": self._body.state,
+        }
         status = DiagnosticStatus(
             level=level,
             name=self._name,

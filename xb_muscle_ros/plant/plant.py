@@ -185,6 +185,11 @@ class Plant:
         self._data.act[:] = activation
         self._mj.mj_forward(self._model, self._data)
 
+    @property
+    def engine(self) -> tuple[Any, Any]:
+        """MuJoCo's model and data, for viewers, which read them only."""
+        return self._model, self._data
+
     def own_force_n(self) -> Array:
         """Pull of MuJoCo's muscles at the last step, shape (muscle,), N."""
         pull: Array = -self._data.actuator_force[self._own]

@@ -29,6 +29,9 @@ PLANT_PARAMETERS: Mapping[str, Row] = {
     "give_up_s": Row(
         0.0, "longest wait for a muscle node that answers; 0: without end", START, unit="s", bounds=(0.0, 1e6)
     ),
+    "display_hz": Row(
+        50.0, "rate of joint_states and tf, for viewers; 0: none", START, unit="Hz", bounds=(0.0, 1000.0)
+    ),
     "reflex_length_per_l0": Row(
         0.0,
         "excitation per L0 of stretch since the start; with all three gains at 0 no reflex",
