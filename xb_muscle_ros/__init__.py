@@ -23,6 +23,7 @@ _HOMES = {
     "models.fibre_file": ("Fibre", "changed", "load_fibre"),
     "models.fibre_writing": ("write_fibre",),
     "models.muscle": ("Muscle", "Outputs"),
+    "plant.mjcf.muscles": ("CrossBridgeMuscles",),
     "trials.protocol": ("StretchShortenStretch",),
     "trials.simulated": ("Simulated",),
     "trials.trial": ("Phase", "Trial", "TrialFacts"),

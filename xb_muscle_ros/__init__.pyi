@@ -23,6 +23,7 @@ from xb_muscle_ros.models.fibre_file import load_fibre as load_fibre
 from xb_muscle_ros.models.fibre_writing import write_fibre as write_fibre
 from xb_muscle_ros.models.muscle import Muscle as Muscle
 from xb_muscle_ros.models.muscle import Outputs as Outputs
+from xb_muscle_ros.plant.mjcf.muscles import CrossBridgeMuscles as CrossBridgeMuscles
 from xb_muscle_ros.trials.protocol import StretchShortenStretch as StretchShortenStretch
 from xb_muscle_ros.trials.simulated import Simulated as Simulated
 from xb_muscle_ros.trials.trial import Phase as Phase

@@ -64,7 +64,7 @@ def test_knee_is_run_with_and_without_movement(tmp_path: Path, monkeypatch: pyte
         (["--displacement", "nan"], "platform's displacement is nan"),
         (["--live"], "give one --model"),
         (["--live", "--model", "mujoco"], "give one --model"),
-        (["--scene", "knee", "--speed", "1"], "are of the scene ankle; drop them"),
+        (["--scene", "knee", "--speed", "1"], "are of the scenes ankle and myolegs; drop them"),
         (["--reflex-delay-s", "0.1"], "the reflex has no gain above 0"),
         (["--reflex-length-per-l0", "-1"], "length_per_l0 is -1; allowed is 0 to 1000"),
         (["--reflex-force-per-f0", "1", "--reflex-muscle", "soleuss"], "called 'soleuss'; did you mean 'soleus'?"),

@@ -5,32 +5,33 @@ from __future__ import annotations
 import argparse
 import functools
 import itertools
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
-from xb_muscle_ros.cli import common
+from xb_muscle_ros.cli import common, loop_leg, loop_reflex
+from xb_muscle_ros.cli.loop_models import fibres_of, platform_values
 from xb_muscle_ros.errors import UserError
-
-if TYPE_CHECKING:
-    from xb_muscle_ros.models.fibre_file import Fibre
-    from xb_muscle_ros.plant.reflex import Reflex
 
 _MODELS = ("3state_coop", "hill_se", "hill", "mujoco")
 DESCRIPTION = (
-    "Step a body in MuJoCo and its muscles in turn: standing on a platform that moves (ankle), or the pendulum test "
-    "(knee). Writes loop.json, loop.csv and a figure, the same bytes each time."
+    "Step a body in MuJoCo and its muscles in turn: standing on a platform that moves (ankle: one joint; myolegs: two "
+    "legs with eighty muscles), or the pendulum test (knee). Writes loop.json, loop.csv and a figure, the same bytes "
+    "each time."
 )
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
-    parser.add_argument("--scene", choices=("ankle", "knee"), default="ankle", help="what to move (default ankle)")
+    parser.add_argument("--scene", choices=tuple(_SCENES), default="ankle", help="what to move (default ankle)")
     common.add_fibre(parser, "18Dec2017a")
     parser.add_argument(
         "--model", dest="models", metavar="MODEL", action="append",
-        help=f"parameter set, or mujoco for MuJoCo's own muscle (may be given again; default: {', '.join(_MODELS)})",
+        help=f"parameter set, or mujoco for MuJoCo's own muscle (may be given again; default: {', '.join(_MODELS)}; in "
+        f"the scene myolegs {', '.join(loop_leg.MODELS)})",
     )  # fmt: skip
     common.add_out(parser, "folder for loop.json, loop.csv and the figure")
-    parser.add_argument("--duration", type=float, metavar="S", help="length of the run, s (default: ankle 0.5, knee 4)")
+    parser.add_argument(
+        "--duration", type=float, metavar="S", help="length of the run, s (default: ankle 0.5, knee 4, myolegs 1)"
+    )
     parser.add_argument(
         "--elastic-tendon", action="store_true", help="tendons stretch (default: rigid, as with a muscle_node)"
     )
@@ -38,53 +39,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--live", action="store_true",
         help="the muscles are fibres of a running muscle_node (mode lockstep; what is missing is said)",
     )  # fmt: skip
-    ankle = parser.add_argument_group("platform of the scene ankle")
+    ankle = parser.add_argument_group(
+        "platform of the scenes ankle and myolegs (which moves both ways, and by half of it)"
+    )
     ankle.add_argument("--displacement", type=float, metavar="M", help="way, m (default -0.075: backwards)")
     ankle.add_argument("--speed", type=float, metavar="M_PER_S", help="speed, m/s (default 0.2)")
     ankle.add_argument("--acceleration", type=float, metavar="M_PER_S2", help="acceleration, m/s² (default 2)")
-    _add_reflex(parser)
-
-
-_REFLEX = (
-    ("length_per_l0", "PER_L0", "excitation (0 to 1) per L0 of stretch since the start"),
-    ("velocity_s_per_l0", "S_PER_L0", "excitation per L0/s of lengthening"),
-    ("force_per_f0", "PER_F0", "excitation per F0 of force above that of the start"),
-    ("delay_s", "S", "from fibre to excitation, whole ticks (default 0.04)"),
-    ("length_threshold_l0", "L0", "stretch below which length has no effect (default 0)"),
-    ("velocity_threshold_l0_per_s", "L0_PER_S", "velocity below which it has no effect (default 0)"),
-)
-
-
-def _add_reflex(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("stretch reflex; off unless one of the first three is given")
-    for name, unit, meaning in _REFLEX:
-        option = f"--reflex-{name.replace('_', '-')}"
-        group.add_argument(option, dest=f"reflex_{name}", type=float, metavar=unit, help=meaning)
-    group.add_argument(
-        "--reflex-muscle", dest="reflex_muscles", metavar="NAME", action="append",
-        help="name or pattern of muscles that have it (may be given again; default: all)",
-    )  # fmt: skip
-
-
-def _reflex(arguments: argparse.Namespace) -> Reflex:
-    """The reflex asked for; none by default.
-
-    Raises:
-        UserError: a number out of range, or a delay without a gain.
-    """
-    from xb_muscle_ros.plant.reflex import Reflex
-
-    given = {name: getattr(arguments, f"reflex_{name}") for name, _, _ in _REFLEX}
-    values = {name: value for name, value in given.items() if value is not None}
-    muscles = tuple(arguments.reflex_muscles or ())
-    reflex = Reflex(**values, muscles=muscles)
-    if (values or muscles) and not reflex.works:
-        raise UserError("the reflex has no gain above 0; give --reflex-length-per-l0 or another, or drop the others")
-    return reflex
+    loop_leg.add_arguments(parser)
+    loop_reflex.add_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run all models, print the table, write the files."""
+    """Run all models in the scene asked for, print the table, write the files."""
+    return _SCENES[arguments.scene](arguments)
+
+
+def _run_joint(arguments: argparse.Namespace) -> int:
+    """The scenes of one joint."""
     from xb_muscle_ros.files import matching, refuse_older
     from xb_muscle_ros.plant.figure import draw_loop
     from xb_muscle_ros.plant.loop import DURATION_S, Muscles, in_process, run_ankle, run_knee
@@ -102,16 +73,12 @@ def run(arguments: argparse.Namespace) -> int:
     duration = DURATION_S[scene] if arguments.duration is None else arguments.duration
     if not 0.01 <= duration <= 60.0:
         raise UserError(f"--duration is {duration:g} s; allowed is 0.01 to 60")
-    asked = {
-        "displacement_m": arguments.displacement,
-        "speed_m_per_s": arguments.speed,
-        "acceleration_m_per_s2": arguments.acceleration,
-    }
-    given = {name: value for name, value in asked.items() if value is not None}
-    if scene != "ankle" and given:
-        raise UserError("--displacement, --speed and --acceleration are of the scene ankle; drop them")
+    given = platform_values(arguments)
+    if scene == "knee" and given:
+        raise UserError("--displacement, --speed and --acceleration are of the scenes ankle and myolegs; drop them")
+    loop_leg.refuse(arguments)
     platform = RampAndHold(**given)
-    reflex = _reflex(arguments)
+    reflex = loop_reflex.reflex_of(arguments)
     # Before any model is compiled: is there an engine at all?
     plant = Plant(scene)
     settings: dict[str, object] = {"mujoco": plant.version, "tick_s": plant.tick_s, "duration_s": duration}
@@ -122,7 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
         # Each model without it and with it: what it does is the difference.
         settings["reflex"] = vars(reflex)
         reflexes.append(reflex)
-    fibres = _fibres(arguments.fiber, arguments.models)
+    fibres = fibres_of(arguments.fiber, arguments.models, _MODELS)
     muscles: Muscles = in_process
     if arguments.live:
         # The one place where this command touches ROS, and only when asked to.
@@ -162,21 +129,8 @@ def run(arguments: argparse.Namespace) -> int:
     return 2 if any(trace.ended for trace in traces) else 0
 
 
-def _fibres(name: str, models: list[str] | None) -> list[Fibre | None]:
-    """A fibre for each model; None is MuJoCo's muscle. A default that the fibre file has no set for is left out."""
-    from xb_muscle_ros.models.fibre_file import load_fibre
-    from xb_muscle_ros.plant.drives import OWN
-
-    fibres: list[Fibre | None] = []
-    load_fibre(name)  # a fibre that is not there is an error, not a model to leave out
-    for model in dict.fromkeys(models or _MODELS):
-        if model == OWN:
-            fibres.append(None)
-            continue
-        try:
-            fibres.append(load_fibre(name, model))
-        except UserError as error:
-            if models:
-                raise
-            common.warn(f"model {model} is left out: {error}")
-    return fibres
+_SCENES: dict[str, Callable[[argparse.Namespace], int]] = {
+    "ankle": _run_joint,
+    "knee": _run_joint,
+    "myolegs": loop_leg.run,
+}

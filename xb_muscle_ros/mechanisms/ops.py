@@ -12,6 +12,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 # A symbol, an expression or a float. SymPy has no types, and formulas must not care which of them they hold.
 Expr = Any
 
@@ -76,10 +78,14 @@ def softplus(z: Expr, sharpness: Expr) -> Expr:
 
 
 def positive(z: Expr) -> Expr:
-    """Positive part of z, 0 below 0."""
+    """Positive part of z, 0 below 0; of an array that of each entry."""
+    if isinstance(z, np.ndarray):
+        return np.maximum(z, 0.0)
     return max(z, 0.0) if _numeric(z) else _own("Positive", z)
 
 
 def above(z: Expr) -> Expr:
-    """1 where z > 0, else 0."""
+    """1 where z > 0, else 0; of an array that of each entry."""
+    if isinstance(z, np.ndarray):
+        return (z > 0.0).astype(float)
     return float(z > 0.0) if _numeric(z) else _own("UnitStep", z)

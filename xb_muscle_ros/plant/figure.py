@@ -13,7 +13,7 @@ from xb_muscle_ros.plant.report import rows
 from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, SHADE, THIRD, figure, save
 
 _FIRST_S = 0.1
-_LOOKS: tuple[dict[str, Any], ...] = (
+LOOKS: tuple[dict[str, Any], ...] = (
     {"color": MODEL, "linestyle": "-", "linewidth": 1.6},
     {"color": SECOND, "linestyle": (0, (5, 1.5)), "linewidth": 1.4},
     {"color": THIRD, "linestyle": (0, (6, 1.5, 1, 1.5)), "linewidth": 1.4},
@@ -79,7 +79,7 @@ def _looks(traces: Sequence[Trace]) -> list[dict[str, Any]]:
     for trace in traces:
         marker = _MARKERS.get((trace.moved_before, trace.reflex))
         marked = {"marker": marker, **_MARKED} if marker else {}
-        made.append({**_LOOKS[models.index(trace.model) % len(_LOOKS)], **marked})
+        made.append({**LOOKS[models.index(trace.model) % len(LOOKS)], **marked})
     return made
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import importlib.resources
 import math
 from typing import Any, NamedTuple
@@ -11,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.plant.engine import mujoco
 
 Array = npt.NDArray[np.float64]
 
@@ -26,20 +26,6 @@ class Architecture(NamedTuple):
     l0_m: float
     pennation_rad: float
     tendon_slack_m: float
-
-
-def _mujoco() -> Any:
-    """The engine.
-
-    Raises:
-        UserError: it is not installed; it is an extra of this package.
-    """
-    try:
-        return importlib.import_module("mujoco")
-    except ImportError as error:
-        raise UserError(
-            f"MuJoCo cannot be imported ({error}); install it with pip install 'xb_muscle_ros[mujoco]'"
-        ) from None
 
 
 class Plant:
@@ -68,7 +54,7 @@ class Plant:
         """
         if scene not in SCENES:
             raise UserError(f"scene '{scene}' is not known{suggest(scene, SCENES)}")
-        self._mj = _mujoco()
+        self._mj = mujoco()
         text = importlib.resources.files(__package__).joinpath(f"{scene}.xml").read_text(encoding="utf-8")
         self._model = self._mj.MjModel.from_xml_string(text)
         self._data = self._mj.MjData(self._model)

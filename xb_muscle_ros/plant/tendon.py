@@ -5,9 +5,20 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
 # Tendon force over strain after De Groote et al. (2016), doi 10.1007/s10439-016-1591-9: f = C1·exp(K·(l − C2)) − C3,
 # with force f in F0 and length l in slack lengths.
 _K, _C1, _C2, _C3 = 35.0, 0.200, 0.995, 0.250
+
+
+def strain(force_f0: Array) -> Array:
+    """Stretch from no force to a force in F0, in slack lengths; the inverse of the curve."""
+    found: Array = np.log1p(force_f0 / _C3) / _K
+    return found
 
 
 class Tendon(NamedTuple):

@@ -1,0 +1,87 @@
+"""``xb_muscle loop --scene myolegs`` as a user meets it."""
+
+from __future__ import annotations
+
+import csv
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from xb_muscle_ros.cli.main import main
+from xb_muscle_ros.plant.leg.stance import Stance
+
+SHORT = ["loop", "--scene", "myolegs", "--model", "mujoco", "--duration", "0.3", "--sway", "3", "--sway-hz", "1"]
+
+
+@pytest.fixture
+def found(monkeypatch: pytest.MonkeyPatch, stance: Stance) -> None:
+    """The stance is that of the session; finding it is tested elsewhere."""
+    monkeypatch.setattr("xb_muscle_ros.plant.leg.stance.find_stance", lambda *_: stance)
+
+
+@pytest.mark.usefixtures("found")
+def test_files_are_identical_when_repeated(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("one", "two"):
+        assert main([*SHORT, "--out", str(tmp_path / name)]) == 0
+    for file in ("loop.json", "loop.csv"):
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
+    assert (tmp_path / "one" / "loop.png").stat().st_size > 30_000
+    tree = json.loads((tmp_path / "one" / "loop.json").read_text())
+    assert tree["scene"] == "myolegs"
+    assert tree["stance"]["residual_nm"] < 1e-6
+    assert tree["stance"]["tone"] == 0.02
+    (run,) = tree["runs"]
+    assert len(run["activation"]) == 80
+    assert run["hold"]["largest_com_m"] < 5e-5
+    assert [push["platform"]["displacement_m"] for push in run["pushes"]] == [-0.0375, -0.075, 0.0375, 0.075]
+    assert [after["sway"] for after in run["after_sway"]] == [
+        {"fibre_l0": 0.0, "frequency_hz": 1.0},
+        {"fibre_l0": 0.03, "frequency_hz": 1.0},
+    ]
+    said = capsys.readouterr()
+    assert said.err == ""
+    stiffness = run["pushes"][1]["numbers"]["stiffness_50ms_mgh"]
+    assert f"{stiffness:.2f}" in said.out
+    assert str(tmp_path / "two" / "loop.png") in said.out
+    with (tmp_path / "one" / "loop.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    # A second each without a push and after the nudge, and 0.3 s each of four pushes and of three for the sway.
+    assert len(rows) == 2 * 1001 + 7 * 301
+    assert {row["before"] for row in rows} == {"no sway", "sway 3 % at 1 Hz"}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--lead", "0.5"], "centre of mass before the ankles is 0.5; allowed is 0 to 0.1 (m)"),
+        (["--tone", "nan"], "least activation is nan; allowed is 0.005 to 0.2"),
+        (["--sway", "40"], "sway is 40 % of soleus fibre length; allowed is 0 to 10"),
+        (["--sway-hz", "0.3"], "sway frequency is 0.3 Hz; allowed are multiples of 0.25"),
+        (["--duration", "0.1"], "--duration is 0.1 s; allowed in the scene myolegs is 0.3 to 10"),
+        (["--speed", "0"], "platform's speed is 0; allowed is 0.001 to 5"),
+        (["--live"], "--live is for the scenes ankle and knee; drop it"),
+        (["--model", "3state_cop"], "did you mean '3state_coop"),
+        (["--fiber", "nobody"], "fibre 'nobody' is not known"),
+        (["--scene", "ankle", "--tone", "0.1"], "--tone only with --scene myolegs"),
+        (["--scene", "knee", "--sway-hz", "1", "--lead", "0.1"], "--lead, --sway-hz only with --scene myolegs"),
+    ],
+)
+def test_wrong_options(arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["loop", "--scene", "myolegs", *arguments, "--out", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert message in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_without_the_model(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    from xb_muscle_ros.plant.leg import body
+
+    monkeypatch.setitem(sys.modules, "myo_sim", None)
+    body._compiled.cache_clear()
+    assert main([*SHORT, "--out", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "pip install 'xb_muscle_ros[body]'" in said

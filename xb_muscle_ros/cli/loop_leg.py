@@ -1,0 +1,91 @@
+"""``xb_muscle loop --scene myolegs``: standing with the eighty muscles of MyoLeg."""
+
+from __future__ import annotations
+
+import argparse
+
+from xb_muscle_ros.cli import common
+from xb_muscle_ros.cli.loop_models import fibres_of, platform_values, values_of
+from xb_muscle_ros.errors import UserError
+
+MODELS = ("3state_coop_slack", "hill_se_slack", "hill", "mujoco")
+"""Whose series elements do not push: muscles of a leg go slack."""
+_SWAY_PERCENT, _SWAY_HZ = (0.0, 1.0, 3.0), (0.5, 1.0)
+_AIM = {"lead": "lead_m", "knee": "knee_rad", "tone": "tone"}
+_OWN = ("lead", "knee", "tone", "sway", "sway_hz")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of this scene alone."""
+    group = parser.add_argument_group("stance of the scene myolegs")
+    group.add_argument("--lead", type=float, metavar="M", help="centre of mass before the ankles, m (default 0.05)")
+    group.add_argument("--knee", type=float, metavar="RAD", help="flexion of the knees, rad (default 0.087)")
+    group.add_argument(
+        "--tone", type=float, metavar="SHARE",
+        help="least activation of every muscle: more means co-contraction (default 0.02)",
+    )  # fmt: skip
+    group.add_argument(
+        "--sway", type=float, action="append", metavar="PERCENT",
+        help="sway before the push by so much soleus fibre length, %% (may be given again; default 0, 1 and 3)",
+    )  # fmt: skip
+    group.add_argument(
+        "--sway-hz", type=float, action="append", metavar="HZ",
+        help="its frequency (may be given again; default 0.5 and 1)",
+    )  # fmt: skip
+
+
+def refuse(arguments: argparse.Namespace) -> None:
+    """Refuse what another scene was given and only this one takes.
+
+    Raises:
+        UserError: one of this scene's options.
+    """
+    given = [f"--{name.replace('_', '-')}" for name in _OWN if getattr(arguments, name) is not None]
+    if given:
+        raise UserError(f"{', '.join(given)} only with --scene myolegs; drop it, or take that scene")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Find the stance, play all episodes of all models, print the tables, write the files."""
+    from xb_muscle_ros.files import matching, refuse_older
+    from xb_muscle_ros.plant.leg.body import Body
+    from xb_muscle_ros.plant.leg.drives import make_drive
+    from xb_muscle_ros.plant.leg.figure import draw_leg
+    from xb_muscle_ros.plant.leg.report import ended, tables, write
+    from xb_muscle_ros.plant.leg.stance import Aim, find_stance
+    from xb_muscle_ros.plant.leg.study import count, run_model, sways
+    from xb_muscle_ros.plant.translation import RampAndHold
+    from xb_muscle_ros.progress import Progress
+
+    if arguments.live:
+        raise UserError("--live is for the scenes ankle and knee; drop it")
+    refuse_older(matching(arguments.out, r"loop\.(json|csv|png|pdf)"), arguments.overwrite)
+    duration = 1.0 if arguments.duration is None else arguments.duration
+    if not 0.3 <= duration <= 10.0:
+        raise UserError(f"--duration is {duration:g} s; allowed in the scene myolegs is 0.3 to 10")
+    platform = RampAndHold(**platform_values(arguments))
+    aim = Aim(**values_of(arguments, _AIM))
+    percent = _SWAY_PERCENT if arguments.sway is None else arguments.sway
+    swayed = sways([value / 100.0 for value in percent], arguments.sway_hz or _SWAY_HZ)
+    fibres = fibres_of(arguments.fiber, arguments.models, MODELS)
+    body = Body()
+    stance = find_stance(body, aim)
+    runs = []
+    with Progress(len(fibres) * count(swayed), "loop") as progress:
+        for fibre in fibres:
+            make = make_drive(fibre, arguments.fiber, arguments.elastic_tendon)
+            runs.append(run_model(make, stance, platform, swayed, duration, progress.update))
+    for line in ended(runs):
+        common.warn(line)
+    print(tables(runs))
+    settings: dict[str, object] = {
+        "mujoco": body.mj.__version__,
+        "tick_s": body.tick_s,
+        "duration_s": duration,
+        "fibre": next((fibre.name for fibre in fibres if fibre is not None), None),
+        "tendon": "elastic" if arguments.elastic_tendon else "rigid",
+    }
+    draw_leg(arguments.out / "loop.png", runs)
+    for path in [*write(arguments.out, body, stance, runs, settings), arguments.out / "loop.png"]:
+        print(path)
+    return 0

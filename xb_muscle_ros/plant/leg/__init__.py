@@ -1,0 +1,1 @@
+"""Standing on a platform that moves, with the eighty muscles of MyoLeg."""

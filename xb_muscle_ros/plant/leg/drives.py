@@ -1,0 +1,131 @@
+"""What pulls at the leg's tendons: MuJoCo's own muscles, or this package's fibres in their place."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.plant.leg.body import Body
+from xb_muscle_ros.plant.leg.stance import Stance
+from xb_muscle_ros.plant.mjcf.muscles import CrossBridgeMuscles
+from xb_muscle_ros.plant.plant import Array
+
+_STEPS, _PRECISION_F0, _LEAST = 60, 1e-13, 1e-300
+
+
+class Drive(Protocol):
+    """Muscles of one body, constantly activated at what holds its stance."""
+
+    model: str
+    driven_by: dict[str, dict[str, float]]
+    """What holds the stance: of each muscle ``calcium_um``, µM, or ``activation``, 0 to 1."""
+
+    def reset(self) -> None:
+        """Settle at the stance, where the body is."""
+
+    def advance(self) -> None:
+        """Go on to the muscles' lengths of now; called once a tick, when positions and velocities are known."""
+
+
+class OwnMuscles:
+    """MuJoCo's muscle actuators: no memory, constant activation."""
+
+    model = "mujoco"
+
+    def __init__(self, body: Body, stance: Stance) -> None:
+        """Take the stance's activations."""
+        self._body, self._activation = body, stance.activation
+        names = zip(body.muscles, stance.activation.tolist(), strict=True)
+        self.driven_by = {"activation": dict(names)}
+
+    def reset(self) -> None:
+        """Activate."""
+        self._body.data.act[:] = self._activation
+        self._body.data.ctrl[:] = self._activation
+
+    def advance(self) -> None:
+        """MuJoCo computes force within its step."""
+
+
+class FibreMuscles:
+    """Fibres of this package in place of MuJoCo's muscles, at constant calcium.
+
+    Calcium is what gives, settled, the very force that the stance asks of each muscle: fibres and MuJoCo's muscle then
+    stand at the same posture with the same forces.
+    """
+
+    def __init__(self, body: Body, stance: Stance, table: Mapping[str, Any], model: str) -> None:
+        """Replace the body's muscles and find calcium.
+
+        Args:
+            body: its actuators become plain forces.
+            stance: to hold.
+            table: of `CrossBridgeMuscles`.
+            model: what it is called.
+
+        Raises:
+            UserError: a muscle cannot give the force that the stance asks of it.
+        """
+        self.model = model
+        self._body, self._stance = body, stance
+        self._muscles = CrossBridgeMuscles(body.model, table)
+        body.place(stance.qpos)
+        self._calcium_um = self._calcium()
+        names = zip(body.muscles, self._calcium_um.tolist(), strict=True)
+        self.driven_by = {"calcium_um": dict(names)}
+
+    def _calcium(self) -> Array:
+        """Calcium at which settled muscles pull as the stance asks: regula falsi (Illinois), all at once."""
+        low, high = np.zeros_like(self._stance.force_n), np.ones_like(self._stance.force_n)
+        below, above = self._excess_f0(low), self._excess_f0(high)
+        for k in np.flatnonzero((below > 0.0) | (above < 0.0))[:1]:
+            f0_n, asked = float(self._muscles.f0_n[k]), float(self._stance.force_n[k])
+            raise UserError(
+                f"{self.model}: the stance asks {asked:.4g} N of {self._body.muscles[k]}, which at this length gives "
+                f"{asked + f0_n * below[k]:.4g} to {asked + f0_n * above[k]:.4g} N; take another --tone or model"
+            )
+        rose = np.full(low.shape, -1)
+        for _ in range(_STEPS):
+            now = (low * above - high * below) / np.maximum(above - below, _LEAST)
+            excess = self._excess_f0(now)
+            if np.max(np.abs(excess)) < _PRECISION_F0:
+                break
+            rises = excess < 0.0
+            # An end that stays twice counts half, so that it moves too.
+            again = np.where(rises == rose, 0.5, 1.0)
+            above, below = np.where(rises, again * above, excess), np.where(rises, excess, again * below)
+            low, high, rose = np.where(rises, now, low), np.where(rises, high, now), rises
+        return self._muscles.calcium_um(now)
+
+    def _excess_f0(self, activation: Array) -> Array:
+        """Settled pull beyond what the stance asks, F0."""
+        pull = self._muscles.reset(self._body.data, self._muscles.calcium_um(activation))
+        excess: Array = (pull - self._stance.force_n) / self._muscles.f0_n
+        return excess
+
+    def reset(self) -> None:
+        """Settle."""
+        self._muscles.reset(self._body.data, self._calcium_um)
+
+    def advance(self) -> None:
+        """One step of all fibres."""
+        self._muscles.advance(self._body.data, self._calcium_um)
+
+
+def make_drive(fibre: Fibre | None, source: str, elastic: bool) -> Callable[[Body, Stance], Drive]:
+    """Makes the drive of a body for its stance.
+
+    Args:
+        fibre: whose model the muscles have; None: MuJoCo's own.
+        source: file or name of the fibre.
+        elastic: tendons stretch; MuJoCo's muscle has none.
+    """
+    if fibre is None:
+        return OwnMuscles
+    choice = {"fibre": source, "model": fibre.model, "tendon": "elastic" if elastic else "rigid"}
+    return functools.partial(FibreMuscles, table={"default": choice}, model=fibre.model)

@@ -1,0 +1,1 @@
+"""Muscles of any MuJoCo model as cross-bridge fibres."""

@@ -1,0 +1,81 @@
+"""The fibre of each muscle: a calibrated fibre with the muscle's force-length relations, tendon and constants."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from xb_muscle_ros.models.fibre_file import Fibre, changed
+from xb_muscle_ros.plant.mjcf.actuators import MuscleActuators
+from xb_muscle_ros.plant.mjcf.calibration import Calibration, calibrated
+from xb_muscle_ros.plant.mjcf.fitting import NAMES, fitted
+from xb_muscle_ros.plant.mjcf.relations import Relations, relations_of
+from xb_muscle_ros.plant.mjcf.spring import series_values, spring_of
+from xb_muscle_ros.plant.mjcf.table import Choice
+from xb_muscle_ros.plant.plant import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """Fibres of a model's muscles, in order.
+
+    Attributes:
+        fibres: one for each muscle; named after it, with its F0 and L0.
+        calcium_um: tables of calcium by activation, shape (table, point), see `Calibration`.
+        table: which of them each muscle has, shape (muscle,).
+        relations: isometric force by length.
+        warnings: lines on what was taken for granted.
+    """
+
+    fibres: tuple[Fibre, ...]
+    calcium_um: Array
+    table: npt.NDArray[np.int64]
+    relations: Relations
+    warnings: tuple[str, ...]
+
+
+def build(mj: Any, muscles: MuscleActuators, chosen: Sequence[Choice]) -> Built:
+    """Make the fibres.
+
+    Args:
+        mj: MuJoCo.
+        muscles: what the model says.
+        chosen: of each muscle.
+
+    Raises:
+        UserError: an unknown fibre, model or parameter, or one that a muscle cannot have.
+    """
+    known: dict[tuple[object, ...], tuple[int, Calibration]] = {}
+    # Left and right legs are alike.
+    fit = functools.cache(functools.partial(fitted, mj))
+    fibres, table, rigid = [], [], []
+    for k, (name, choice) in enumerate(zip(muscles.names, chosen, strict=True)):
+        where = f"muscle {name}"
+        if choice.key not in known:
+            known[choice.key] = len(known), calibrated(choice, where)
+        row, calibration = known[choice.key]
+        fibre, slack_l0 = calibration.fibre, float(muscles.slack_m[k] / muscles.l0_m[k])
+        if choice.tendon == "elastic" and slack_l0 > 0.0:
+            fibre = changed(fibre, series_values(fibre, slack_l0, where), where)
+        elif choice.tendon == "elastic":
+            rigid.append(name)
+        own = (float(muscles.fl_min[k]), float(muscles.fl_max[k]), float(muscles.fp_max[k]))
+        low, high = np.round(muscles.range_l0[k], 3).tolist()
+        values = fit(own, (low, high), spring_of(fibre)).tolist()
+        fibre = changed(fibre, dict(zip(NAMES, values, strict=True)), where)
+        f0_n, l0_m = float(muscles.f0_n[k]), float(muscles.l0_m[k])
+        fibres.append(replace(fibre, name=name, f0_n=f0_n, reference_length_m=l0_m))
+        table.append(row)
+    calcium = np.stack([calibration.calcium_um for _, calibration in known.values()])
+    return Built(tuple(fibres), calcium, np.array(table), relations_of(fibres), _kept_rigid(rigid))
+
+
+def _kept_rigid(names: Sequence[str]) -> tuple[str, ...]:
+    if not names:
+        return ()
+    return (f"{', '.join(names)}: tendons stay rigid, since the model's numbers leave no length for one",)
