@@ -7,21 +7,28 @@ import pytest
 
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.plant.activation import FALL_S, RISE_S, CalciumTable, activated, reflex_calcium
+from xb_muscle_ros.plant.activation import FALL_S, RISE_S, CalciumTable, ReflexActivation, reflex_calcium
 
 
 def test_the_stage_is_mujocos() -> None:
+    """Rising from the start, with excitation that comes and goes."""
     mujoco = pytest.importorskip("mujoco", reason="needs the extra mujoco")
     rng = np.random.default_rng(1)
-    activation, excitation = rng.random(50), rng.random(50)
-    parameters = np.array([RISE_S, FALL_S, 0.0])
-    rate = [mujoco.mju_muscleDynamics(u, a, parameters) for u, a in zip(excitation, activation, strict=True)]
-    assert activated(activation, excitation, 1e-3) == pytest.approx(activation + 1e-3 * np.array(rate), rel=1e-12)
+    start = rng.random(50)
+    stage, parameters, expected = ReflexActivation(start, 1e-3), np.array([RISE_S, FALL_S, 0.0]), start
+    for _ in range(100):
+        added = 0.5 * np.maximum(rng.random(50) - 0.5, 0.0)
+        wanted = np.minimum(start + added, 1.0)
+        rate = [mujoco.mju_muscleDynamics(u, a, parameters) for u, a in zip(wanted, expected, strict=True)]
+        expected = expected + 1e-3 * np.array(rate)
+        assert stage(added) == pytest.approx(expected, rel=1e-12)
 
 
-def test_the_stage_rests_where_excitation_is_activation() -> None:
+def test_the_stage_rests_where_nothing_is_added() -> None:
     activation = np.random.default_rng(2).random(80)
-    assert activated(activation, activation, 1e-3).tobytes() == activation.tobytes()
+    stage = ReflexActivation(activation, 1e-3)
+    for _ in range(10):
+        assert stage(np.zeros(80)).tobytes() == activation.tobytes()
 
 
 @pytest.mark.parametrize("model", ["3state_coop", "hill"])

@@ -2,38 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.plant.mjcf.kernels import next_activation
 from xb_muscle_ros.plant.plant import Array
 
 RISE_S, FALL_S = 0.01, 0.04
 """Time constants of MuJoCo's muscle."""
 _RELAXED_PCA, _FULL_PCA, _POINTS = 9.0, 4.0, 201
-
-
-def activated(
-    activation: Array, excitation: Array, dt_s: float, rise_s: float = RISE_S, fall_s: float = FALL_S
-) -> Array:
-    """Activation after a tick.
-
-    First-order, slower the more of the muscle is active when it rises, and the less when it falls: Millard et al.
-    (2013), doi 10.1115/1.4023390, as MuJoCo's muscle has it; one explicit step, as MuJoCo takes.
-
-    Args:
-        activation, excitation: 0 to 1, shape (muscle,).
-        dt_s: length of the tick, below the time constants.
-        rise_s, fall_s: time constants.
-
-    Returns:
-        shape (muscle,); where excitation equals activation, that very value.
-    """
-    speed = 0.5 + 1.5 * activation
-    tau_s = np.where(excitation > activation, rise_s * speed, fall_s / speed)
-    after: Array = activation + (excitation - activation) * np.minimum(dt_s / tau_s, 1.0)
-    return after
 
 
 class CalciumTable:
@@ -68,12 +48,15 @@ class ReflexActivation:
         """In equilibrium.
 
         Args:
-            activation: at the start, shape (muscle,).
+            activation: at the start, 0 to 1, shape (muscle,).
             tick_s: time between calls.
         """
         self._start = activation
         self._now = activation
         self._tick_s = tick_s
+        # Both time constants, a switch between them, and the ranges of excitation and activation.
+        row = [RISE_S, FALL_S, 0.0, 0.0, 1.0, 0.0, math.inf]
+        self._rows: Array = np.tile(row, (activation.size, 1))
 
     def __call__(self, added: Array) -> Array:
         """Activation of the next tick, shape (muscle,); that of the start, to the bit, where nothing was added yet.
@@ -81,9 +64,10 @@ class ReflexActivation:
         Args:
             added: excitation on top of that of the start, 0 or above, shape (muscle,); together at most 1.
         """
-        excitation = np.maximum(np.minimum(self._start + added, 1.0), self._start)
-        self._now = activated(self._now, excitation, self._tick_s)
-        return self._now
+        after = np.empty_like(self._now)
+        next_activation(self._now, self._start + added, self._tick_s, self._rows, after)
+        self._now = after
+        return after
 
 
 def reflex_calcium(

@@ -264,6 +264,8 @@ def beyond(muscles: Sequence[str], length_l0: Array) -> str:
         length_l0: length changes of their fibres, shape (muscle,).
     """
     least, most = LENGTH_CHANGE_L0
+    if np.all((length_l0 >= least) & (length_l0 <= most)):
+        return ""
     for name, change in zip(muscles, length_l0.tolist(), strict=True):
         if not least <= change <= most:
             return f"the fibre of {name} comes to {1.0 + change:.3f} L0, beyond {1.0 + least:g} to {1.0 + most:g} L0"

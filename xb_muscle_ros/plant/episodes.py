@@ -214,13 +214,13 @@ class Episodes:
                     self._insist(self._look_again)
         finally:
             ticker.stop()
-        if self._broken is not None:
-            raise self._broken
         late = ticker.lateness.summary()
         self._log.info(
             f"episode of {self._body.tick} ticks: lateness p50 {late.p50_us:.0f}, p99 {late.p99_us:.0f} µs, "
             f"{ticker.overruns} overruns"
         )
+        if self._broken is not None:
+            raise self._broken
 
     def _look_again(self) -> bool:
         """Whether the forces are back, or the episode is over for another reason.

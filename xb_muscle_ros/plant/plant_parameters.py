@@ -13,10 +13,12 @@ from xb_muscle_ros.plant.reflex import NO_REFLEX, Reflex
 
 # All are read at the start only.
 PLANT_PARAMETERS: Mapping[str, Row] = {
-    "scene": Row("ankle", "what to move", START, choices=("ankle", "knee")),
+    "scene": Row("ankle", "what to move", START, choices=("ankle", "knee", "myolegs")),
     "mode": Row("lockstep", "of the muscle node and so of this one", START, choices=("lockstep", "realtime")),
     "fiber_file": Row("18Dec2017a", "fibre file, path or packaged fibre name", START),
-    "model": Row("3state_coop", "parameter set of the fibre file", START),
+    "model": Row(
+        "", "parameter set of the fibre file; empty: 3state_coop, in the scene myolegs 3state_coop_slack", START
+    ),
     "elastic_tendon": Row(False, "tendons stretch", START),
     "duration_s": Row(1.0, "length of an episode; then all starts anew", START, unit="s", bounds=(0.01, 3600.0)),
     "episodes": Row(0, "how many; 0: until stopped", START, bounds=(0, 10**9)),

@@ -10,10 +10,12 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.plant.activation import reflex_calcium
 from xb_muscle_ros.plant.leg.body import Body
 from xb_muscle_ros.plant.leg.stance import Stance
 from xb_muscle_ros.plant.mjcf.muscles import CrossBridgeMuscles
 from xb_muscle_ros.plant.plant import Array
+from xb_muscle_ros.plant.reflex import NO_REFLEX, Reflex, ReflexArc, ReflexLoop
 
 _STEPS, _PRECISION_F0, _LEAST = 60, 1e-13, 1e-300
 
@@ -37,8 +39,16 @@ class OwnMuscles:
 
     model = "mujoco"
 
-    def __init__(self, body: Body, stance: Stance) -> None:
-        """Take the stance's activations."""
+    def __init__(self, body: Body, stance: Stance, reflex: Reflex = NO_REFLEX) -> None:
+        """Take the stance's activations.
+
+        Raises:
+            UserError: a reflex, which the scene does not have for MuJoCo's muscle.
+        """
+        if reflex.works:
+            raise UserError(
+                "in the scene myolegs MuJoCo's own muscle has no reflex; drop the reflex, or leave model mujoco out"
+            )
         self._body, self._activation = body, stance.activation
         names = zip(body.muscles, stance.activation.tolist(), strict=True)
         self.driven_by = {"activation": dict(names)}
@@ -53,34 +63,60 @@ class OwnMuscles:
 
 
 class FibreMuscles:
-    """Fibres of this package in place of MuJoCo's muscles, at constant calcium.
+    """Fibres of this package in place of MuJoCo's muscles, at constant calcium but for a reflex.
 
     Calcium is what gives, settled, the very force that the stance asks of each muscle: fibres and MuJoCo's muscle then
     stand at the same posture with the same forces.
     """
 
-    def __init__(self, body: Body, stance: Stance, table: Mapping[str, Any], model: str) -> None:
+    def __init__(
+        self, body: Body, stance: Stance, table: Mapping[str, Any], model: str, reflex: Reflex = NO_REFLEX
+    ) -> None:
         """Replace the body's muscles and find calcium.
 
         Args:
             body: its actuators become plain forces.
             stance: to hold.
             table: of `CrossBridgeMuscles`.
-            model: what it is called.
+            model: what it is called; with a reflex that is added.
+            reflex: of the muscles.
 
         Raises:
-            UserError: a muscle cannot give the force that the stance asks of it.
+            UserError: a muscle cannot give the force that the stance asks of it, or the reflex does not fit.
         """
-        self.model = model
+        self.model = f"{model}, reflex" if reflex.works else model
         self._body, self._stance = body, stance
         self._muscles = CrossBridgeMuscles(body.model, table)
         body.place(stance.qpos)
-        self._calcium_um = self._calcium()
-        names = zip(body.muscles, self._calcium_um.tolist(), strict=True)
+        self.activation = self._activation_of_stance()
+        self.calcium_um = self._muscles.calcium_um(self.activation)
+        self.of_reflex = reflex
+        names = zip(body.muscles, self.calcium_um.tolist(), strict=True)
         self.driven_by = {"calcium_um": dict(names)}
+        self._start()
 
-    def _calcium(self) -> Array:
-        """Calcium at which settled muscles pull as the stance asks: regula falsi (Illinois), all at once."""
+    @property
+    def muscles(self) -> CrossBridgeMuscles:
+        """Of the body."""
+        return self._muscles
+
+    def reflex_loop(self) -> ReflexLoop | None:
+        """A reflex from its start on; None where there is none.
+
+        Raises:
+            UserError: it does not fit the muscles or the tick.
+        """
+        arc = ReflexArc(self.of_reflex, self._body.muscles, self._body.tick_s)
+        if not self.of_reflex.works:
+            return None
+        level = reflex_calcium(self.activation, self.calcium_um, self._muscles.calcium_um, self._body.tick_s)
+        return ReflexLoop(arc, self.calcium_um, level)
+
+    def _start(self) -> None:
+        self._now_um, self._reflex = self.calcium_um, self.reflex_loop()
+
+    def _activation_of_stance(self) -> Array:
+        """Activation at which settled muscles pull as the stance asks: regula falsi (Illinois), all at once."""
         low, high = np.zeros_like(self._stance.force_n), np.ones_like(self._stance.force_n)
         below, above = self._excess_f0(low), self._excess_f0(high)
         for k in np.flatnonzero((below > 0.0) | (above < 0.0))[:1]:
@@ -100,7 +136,8 @@ class FibreMuscles:
             again = np.where(rises == rose, 0.5, 1.0)
             above, below = np.where(rises, again * above, excess), np.where(rises, excess, again * below)
             low, high, rose = np.where(rises, now, low), np.where(rises, high, now), rises
-        return self._muscles.calcium_um(now)
+        found: Array = now
+        return found
 
     def _excess_f0(self, activation: Array) -> Array:
         """Settled pull beyond what the stance asks, F0."""
@@ -110,22 +147,37 @@ class FibreMuscles:
 
     def reset(self) -> None:
         """Settle."""
-        self._muscles.reset(self._body.data, self._calcium_um)
+        self._start()
+        self._muscles.reset(self._body.data, self.calcium_um)
 
     def advance(self) -> None:
         """One step of all fibres."""
-        self._muscles.advance(self._body.data, self._calcium_um)
+        data = self._body.data
+        pull_n = self._muscles.advance(data, self._now_um)
+        if self._reflex is not None:
+            length_l0 = self._muscles.length_change_l0(data)
+            self._now_um = self._reflex.observe(length_l0, pull_n / self._muscles.f0_n)
 
 
-def make_drive(fibre: Fibre | None, source: str, elastic: bool) -> Callable[[Body, Stance], Drive]:
+def make_fibres(
+    fibre: Fibre, source: str, elastic: bool, reflex: Reflex = NO_REFLEX
+) -> Callable[[Body, Stance], FibreMuscles]:
+    """As `make_drive`, for models of this package."""
+    choice = {"fibre": source, "model": fibre.model, "tendon": "elastic" if elastic else "rigid"}
+    return functools.partial(FibreMuscles, table={"default": choice}, model=fibre.model, reflex=reflex)
+
+
+def make_drive(
+    fibre: Fibre | None, source: str, elastic: bool, reflex: Reflex = NO_REFLEX
+) -> Callable[[Body, Stance], Drive]:
     """Makes the drive of a body for its stance.
 
     Args:
         fibre: whose model the muscles have; None: MuJoCo's own.
         source: file or name of the fibre.
         elastic: tendons stretch; MuJoCo's muscle has none.
+        reflex: of the muscles, from lengths of fibre and tendon together.
     """
     if fibre is None:
-        return OwnMuscles
-    choice = {"fibre": source, "model": fibre.model, "tendon": "elastic" if elastic else "rigid"}
-    return functools.partial(FibreMuscles, table={"default": choice}, model=fibre.model)
+        return functools.partial(OwnMuscles, reflex=reflex)
+    return make_fibres(fibre, source, elastic, reflex)
