@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from xb_muscle_ros.cli import common, loop_reflex
@@ -22,7 +23,7 @@ MODELS = ("3state_coop_slack", "hill_se_slack", "hill", "mujoco")
 """Whose series elements do not push: muscles of a leg go slack."""
 _SWAY_PERCENT, _SWAY_HZ = (0.0, 1.0, 3.0), (0.5, 1.0)
 _AIM = {"lead": "lead_m", "knee": "knee_rad", "tone": "tone"}
-_OWN = ("lead", "knee", "tone", "sway", "sway_hz")
+_OWN = ("lead", "knee", "tone", "sway", "sway_hz", "node_parameters")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,6 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--sway-hz", type=float, action="append", metavar="HZ",
         help="its frequency (may be given again; default 0.5 and 1)",
+    )  # fmt: skip
+    group.add_argument(
+        "--node-parameters", type=Path, metavar="FILE",
+        help="run nothing; write the parameter file of a muscle_node that has the fibres of the one --model",
     )  # fmt: skip
 
 
@@ -67,6 +72,8 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.plant.translation import RampAndHold
     from xb_muscle_ros.progress import Progress
 
+    if arguments.node_parameters is not None:
+        return _write_node_parameters(arguments)
     if arguments.live and (len(arguments.models or ()) != 1 or arguments.models == ["mujoco"]):
         raise UserError("--live is for the one model that the node has; give one --model, and not mujoco")
     refuse_older(matching(arguments.out, r"loop\.(json|csv|png|pdf)"), arguments.overwrite)
@@ -105,6 +112,24 @@ def run(arguments: argparse.Namespace) -> int:
     draw_leg(arguments.out / "loop.png", runs)
     for path in [*write(arguments.out, body, stance, runs, settings), arguments.out / "loop.png"]:
         print(path)
+    return 0
+
+
+def _write_node_parameters(arguments: argparse.Namespace) -> int:
+    """Write the file, and print how to use it."""
+    from xb_muscle_ros.plant.leg.body import Body
+    from xb_muscle_ros.plant.leg.drives import bridged
+    from xb_muscle_ros.plant.node_file import write_node_file
+
+    path: Path = arguments.node_parameters
+    fibres = [fibre for fibre in fibres_of(arguments.fiber, arguments.models, MODELS[:1]) if fibre is not None]
+    if len(fibres) != 1 or len(arguments.models or MODELS[:1]) != 1:
+        raise UserError("--node-parameters is for the one model that a node has; give one --model, and not mujoco")
+    if path.exists() and not arguments.overwrite:
+        raise UserError(f"{path} exists; use --overwrite to replace it, or choose another file")
+    muscles = bridged(Body(), fibres[0], arguments.fiber, arguments.elastic_tendon)
+    write_node_file(path, muscles.fibres, arguments.fiber, "lockstep")
+    print(f"{path}\nmuscle_node --ros-args --params-file {path}  # -p mode:=realtime for another clock")
     return 0
 
 

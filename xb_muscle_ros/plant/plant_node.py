@@ -16,7 +16,8 @@ USAGE = """\
 usage: plant_node --ros-args [-p NAME:=VALUE]... [-r __ns:=/NAMESPACE]
 
 A body in MuJoCo as a ROS 2 node: publishes muscle/length (with velocity), muscle/calcium, plant/joint, and
-joint_states and tf for viewers; subscribes muscle/force. It needs a muscle_node with a fibre for each of its muscles, and says how to start one.
+joint_states and tf for viewers; subscribes muscle/force. It needs a muscle_node with a fibre for each of its muscles,
+and says how to start one.
   plant_node --ros-args -p scene:=ankle -p mode:=realtime
 docs/loop.md lists parameters."""
 

@@ -163,8 +163,17 @@ def make_fibres(
     fibre: Fibre, source: str, elastic: bool, reflex: Reflex = NO_REFLEX
 ) -> Callable[[Body, Stance], FibreMuscles]:
     """As `make_drive`, for models of this package."""
-    choice = {"fibre": source, "model": fibre.model, "tendon": "elastic" if elastic else "rigid"}
-    return functools.partial(FibreMuscles, table={"default": choice}, model=fibre.model, reflex=reflex)
+    table = _table(fibre, source, elastic)
+    return functools.partial(FibreMuscles, table=table, model=fibre.model, reflex=reflex)
+
+
+def bridged(body: Body, fibre: Fibre, source: str, elastic: bool) -> CrossBridgeMuscles:
+    """The muscles alone, in place of the body's own; arguments as for `make_drive`."""
+    return CrossBridgeMuscles(body.model, _table(fibre, source, elastic))
+
+
+def _table(fibre: Fibre, source: str, elastic: bool) -> Mapping[str, Any]:
+    return {"default": {"fibre": source, "model": fibre.model, "tendon": "elastic" if elastic else "rigid"}}
 
 
 def make_drive(

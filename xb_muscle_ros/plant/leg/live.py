@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -47,11 +46,12 @@ class LiveFibres:
         self._period_ns = round(1e9 * body.tick_s)
         self._end = MuscleEnd(link, architectures(inside), inside.muscles.fibres, "lockstep")
         self._end.find()
+        self._tick, self._reflex = 0, inside.reflex_loop()
         self.reset()
 
     def reset(self) -> None:
-        """Settle."""
-        self._tick = 0
+        """Settle; see `check_calcium`."""
+        self.check_calcium()
         self._reflex = self._inside.reflex_loop()
         self._pull(self._end.settle(self._muscles.length_change_l0(self._data), self._inside.calcium_um))
 
@@ -79,6 +79,17 @@ class LiveFibres:
             self._end.send_calcium(stamp + self._reflex.ticks * self._period_ns, self._reflex.ahead)
         self._pull(force_f0)
 
+    def check_calcium(self) -> None:
+        """Begin anew, and see whether the node had all calcium in time.
+
+        Raises:
+            UserError: it had not, so that forces are not those of the reflex.
+        """
+        if self._reflex is not None and self._tick:
+            remedy = "take a longer delay of the reflex, or leave the machine more time"
+            self._end.check_calcium(self._reflex.ticks + 1, remedy)
+        self._tick = 0
+
     def _pull(self, force_f0: Array) -> None:
         self._data.ctrl[self._muscles.index] = -self._muscles.f0_n * force_f0
 
@@ -104,5 +115,14 @@ def live_drive(
     """
     if fibre is None:
         raise UserError("MuJoCo's muscle is none of a muscle_node; give another model")
+    make = make_fibres(fibre, source, elastic, reflex)
+    drives: list[LiveFibres] = []
     with Link("plant", namespace, domain_id) as link:
-        yield functools.partial(LiveFibres, link=link, make=make_fibres(fibre, source, elastic, reflex))
+
+        def made(body: Body, stance: Stance) -> Drive:
+            drives.append(LiveFibres(body, stance, link, make))
+            return drives[-1]
+
+        yield made
+        for drive in drives:
+            drive.check_calcium()
