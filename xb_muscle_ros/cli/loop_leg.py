@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.plant.leg.report import ended, tables, write
     from xb_muscle_ros.plant.leg.stance import Aim, find_stance
     from xb_muscle_ros.plant.leg.study import count, run_model, sways
-    from xb_muscle_ros.plant.reflex import NO_REFLEX
+    from xb_muscle_ros.plant.reflex import NO_REFLEX, ReflexArc
     from xb_muscle_ros.plant.translation import RampAndHold
     from xb_muscle_ros.progress import Progress
 
@@ -91,6 +91,8 @@ def run(arguments: argparse.Namespace) -> int:
         pairs.remove((None, reflex))
         common.warn("model mujoco has no reflex in the scene myolegs and is run without")
     body = Body()
+    # What does not fit is told before anything takes time.
+    ReflexArc(reflex, body.muscles, body.tick_s)
     stance = find_stance(body, aim)
     runs = []
     with Progress(len(pairs) * count(swayed), "loop") as progress:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import itertools
 import os
 import shutil
 import subprocess
@@ -131,17 +133,23 @@ def write_film(path: Path, pictures: Iterable[Picture], per_s: float, ffmpeg: st
             ffmpeg, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
             "-r", f"{per_s:g}", "-i", "-", "-pix_fmt", "yuv420p", "-f", "mp4", str(temporary),
         ]  # fmt: skip
-        with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-            assert process.stdin is not None
-            assert process.stderr is not None
-            try:
-                process.stdin.write(first.tobytes())
-                for picture in rest:
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+        assert process.stdin is not None
+        assert process.stderr is not None
+        try:
+            # A program that has given up says why, which is more than that it no longer reads.
+            with contextlib.suppress(BrokenPipeError):
+                for picture in itertools.chain([first], rest):
                     process.stdin.write(picture.tobytes())
+        except BaseException:
+            process.kill()
+            raise
+        finally:
+            with contextlib.suppress(BrokenPipeError):
                 process.stdin.close()
-            except BrokenPipeError:
-                pass
             said = process.stderr.read().decode(errors="replace").strip()
+            process.stderr.close()
+            process.wait()
         if process.returncode != 0:
             raise UserError(f"{ffmpeg} cannot write {path}: {said or f'code {process.returncode}'}; use --frames")
 
