@@ -25,6 +25,7 @@ from xb_muscle_ros.diagnose.search.system import Names, ordered
 from xb_muscle_ros.diagnose.searching import fit_base
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import write_text
+from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.tables import NOTHING, markdown, number
 
 
@@ -68,14 +69,14 @@ def table(explorer: Explorer, heldout: HeldOut, sets: Sequence[Names]) -> str:
         held = [number(c, ".2f", 100.0) for c in cells]
         share = NOTHING if cells[-1] is None or not base else f"{cells[-1] / base:.2f}"
         gained = explorer.evidence(names) - explorer.evidence(())
-        title = " + ".join(f"`{n.value}`" for n in names) or "nothing"
+        title = " + ".join(f"`{n}`" for n in names) or "nothing"
         rows.append([title, f"{gained:+.1f}", f"{100.0 * fitted:.2f}", *held, share])
     return markdown(head, rows) + "\n"
 
 
 def main(given: argparse.Namespace) -> None:
     """Fit all sets and write the table."""
-    studies = read_fibres(given.bags, given.fiber, given.model, None, None, None)
+    studies = read_fibres(given.bags, [load_fibre(name, given.model) for name in given.fiber])
     effort = QUICK if given.quick else Effort()
     study = fit_base(
         studies, effort, 1, work_options_of(given, journal=given.journal), {}, error_sds_of(given.nuisance)
@@ -83,7 +84,7 @@ def main(given: argparse.Namespace) -> None:
     explorer = study.explorer
     alone = singles(explorer)
     both = pairs(explorer, alone)
-    heldout = HeldOut(explorer, study.recorded, effort.folds, explorer.options)
+    heldout = HeldOut(explorer, study.recorded)
     best = sorted(both, key=explorer.evidence, reverse=True)[: given.predicted]
     heldout.predict([(), *alone, *best])
     write_text(given.out, table(explorer, heldout, [(), *alone, *both]))

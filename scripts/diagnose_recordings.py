@@ -24,8 +24,6 @@ from recorded_predictions import base_fibre, predictions, warned_beforehand
 from recorded_trials import chosen
 
 from xb_muscle_ros.cli.common import add_work, work_options_of
-from xb_muscle_ros.diagnose.effort import QUICK, Effort
-from xb_muscle_ros.diagnose.feature_tables import read_features
 from xb_muscle_ros.diagnose.intake import FibreStudy
 from xb_muscle_ros.diagnose.outputs import JSON, read, write
 from xb_muscle_ros.diagnose.result import Diagnosis
@@ -152,8 +150,7 @@ def diagnose_training(
             ["Where the base of the diagnosis beside it started."],
         )
         studies.append(FibreStudy(start, own, ()))
-    table = None if features is None else read_features(features, {s.fibre.name: s.trials for s in studies})
-    found, made = diagnose(studies, QUICK if quick else Effort(), 1, options, table=table, error_sds=case.error_sds)
+    found, made = diagnose(studies, quick, 1, options, predict=features, error_sds=case.error_sds)
     write(folder, found, made)
 
 

@@ -72,7 +72,7 @@ def _print_row(kind: Kind, shape: str, studies: int) -> None:
         times = _times(kind)
         noise = [sd * _fading(random, times, kind) for sd in _SDS_F0]
         trials = [_trial(f"t{i}", times, kind, shape, e) for i, e in enumerate(noise)]
-        even = {t.facts.trial: evenly_sampled(t) for t in trials}
+        even = {t.facts.trial: evenly_sampled(t.force_time_s) for t in trials}
         model = NoiseModel(tuple(by_curves({t.facts.trial: smooth_pieces(t) for t in trials}, even).values()))
         for of_trial, sd, e in zip(model.trials, _SDS_F0, noise, strict=True):
             ratios.append(of_trial.sd_f0 / sd)

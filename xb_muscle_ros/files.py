@@ -7,6 +7,7 @@ import dataclasses
 import json
 import os
 import re
+import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -67,6 +68,16 @@ def _fields(value: Any) -> Any:
     if not dataclasses.is_dataclass(value) or isinstance(value, type):
         raise TypeError(f"{type(value).__name__} has no form in JSON")
     return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+
+
+def installed_folders(*parts: str) -> Iterator[Path]:
+    """Where a folder of the package's data may lie: in the source tree, then in the installed share folders."""
+    here = Path(__file__).resolve()
+    yield here.parents[1].joinpath(*parts)
+    # With colcon and with pip alike, share/ lies beside the lib/ that holds this package.
+    beside = [parent.parent for parent in here.parents if parent.name in ("lib", "local")]
+    for place in (*beside, Path(sys.prefix)):
+        yield place.joinpath("share", "xb_muscle_ros", *parts)
 
 
 def matching(folder: Path, *patterns: str) -> list[Path]:

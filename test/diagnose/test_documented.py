@@ -27,7 +27,7 @@ def test_every_field_is_explained(record: type, page: str) -> None:
 
 
 def test_every_verdict_and_mechanism_is_there(page: str) -> None:
-    names = [*(v.value for v in result.Verdict), *(n.value for n in MECHANISMS)]
+    names = [*(v.value for v in result.Verdict), *MECHANISMS]
     assert [name for name in names if f"`{name}`" not in page] == []
 
 

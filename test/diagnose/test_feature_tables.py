@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from xb_muscle_ros.diagnose.feature_predictions import as_table, predicted, relative_srs_rmsd
 from xb_muscle_ros.diagnose.feature_tables import FeatureTable, read_features, seen
+from xb_muscle_ros.diagnose.featuring import as_table, relative_srs_rmsd
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.evaluate import grid
 from xb_muscle_ros.evaluate.srs_scores import READINGS, score
-from xb_muscle_ros.fit.features import Feature
+from xb_muscle_ros.fit.features import Feature, simulated
 from xb_muscle_ros.models.fibre_file import load_fibre
+from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.plain import fibre_to_plain
 from xb_muscle_ros.scores.conditions import CONDITIONS, Condition
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
@@ -132,7 +133,7 @@ def test_predictions_are_the_grids(real: FeatureTable) -> None:
     """Shared stretches and waits give what the paper's grid gives; a shift of the solution is another pCa."""
     fibre = load_fibre(A, "3state_coop")
     chosen = [f for f in real.cells[A] if f.pca == 6.2]
-    found = predicted(fibre, chosen, {6.2: 0.05})
+    found = simulated(Muscle(fibre), chosen, {6.2: 0.05})
     recoveries = sorted({f.recovery_s for f in chosen if f.kind == "srs_test"})
     amplitudes = sorted({f.amplitude_l0 for f in chosen if f.kind == "srs_test"})
     task = {
@@ -147,22 +148,22 @@ def test_predictions_are_the_grids(real: FeatureTable) -> None:
             "srs_test": lambda f=f: cells["srs_test"][recoveries.index(f.recovery_s)][amplitudes.index(f.amplitude_l0)],
         }[f.kind]()
         assert value == pytest.approx(expected, rel=1e-3)
-    assert np.max(np.abs(predicted(fibre, chosen) - found)) > 0.5
+    assert np.max(np.abs(simulated(Muscle(fibre), chosen) - found)) > 0.5
 
 
 def test_rmsd_is_that_of_evaluate(real: FeatureTable) -> None:
-    values = {name: predicted(load_fibre(name, "2state"), own) for name, own in real.cells.items()}
+    values = {name: simulated(Muscle(load_fibre(name, "2state")), own) for name, own in real.cells.items()}
     model = as_table("2state", real.data, real.cells, values)
     whole = relative_srs_rmsd(model, real.data)
     for name, reading in READINGS.items():
         expected = score(model, real.data, reading, 8)
-        assert whole[name].rmsd == expected.rmsd
-        assert whole[name].conditions == expected.conditions
+        assert {key: row.value for key, row in whole[name].items()} == expected.rmsd
+        assert {key: row.n for key, row in whole[name].items()} == expected.conditions
     fitted = [Condition(0.0, 0.001), Condition(0.0383, 0.1)]
     concealed = relative_srs_rmsd(model, real.data, [c for c in CONDITIONS if c not in fitted])
-    assert concealed["text"].conditions["large"] == 4
-    assert concealed["released"].conditions["large"] == 8
-    assert relative_srs_rmsd(model, real.data, [])["text"].rmsd == {"large": None, "small": None, "all": None}
+    assert concealed["text"]["large"].n == 4
+    assert concealed["released"]["large"].n == 8
+    assert [row.value for row in relative_srs_rmsd(model, real.data, [])["text"].values()] == [None] * 3
 
 
 def test_what_was_measured_predicts_itself(real: FeatureTable) -> None:
@@ -171,7 +172,7 @@ def test_what_was_measured_predicts_itself(real: FeatureTable) -> None:
     same = as_table("same", data, real.cells, values)
     for name in real.cells:
         assert np.array_equal(same.fibres[name].test, data.fibres[name].test, equal_nan=True)
-    assert max(r.rmsd["all"] or 0.0 for r in relative_srs_rmsd(same, data).values()) < 1e-12
+    assert max(r["all"].value or 0.0 for r in relative_srs_rmsd(same, data).values()) < 1e-12
 
 
 def test_a_run_down_fibres_stretches_are_no_data(shared_data: Path) -> None:

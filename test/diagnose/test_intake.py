@@ -12,7 +12,7 @@ import pytest
 
 from xb_muscle_ros.diagnose.intake import FibreStudy, read_fibres
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.models.fibre_file import find_fibre_file
+from xb_muscle_ros.models.fibre_file import find_fibre_file, load_fibre
 from xb_muscle_ros.scores.noise.model import Source
 from xb_muscle_ros.scores.noise.trials import noise_of
 from xb_muscle_ros.scores.standard_error import force_noise
@@ -65,7 +65,7 @@ def test_one_fibre_takes_all_bags_whatever_they_name(make: Make) -> None:
 
 def test_trials_go_to_the_fibre_they_name_in_the_order_of_recording(make: Make) -> None:
     bags = [make(B, 6.2), make(A, 6.2), make(B, 4.5), make(A, 6.1)]
-    first, second = read_fibres(bags, [A, B], "2state_coop", known=Known(f0_n=2.0))
+    first, second = read_fibres(bags, [load_fibre(name, "2state_coop") for name in (A, B)], Known(f0_n=2.0))
     assert (first.fibre.name, second.fibre.name) == (A, B)
     assert {first.fibre.model, second.fibre.model} == {"2state_coop"}
     assert [trial.facts.pca for trial in first.trials] == [6.2, 6.1]
@@ -136,7 +136,7 @@ def test_different_base_models_are_named(make: Make, tmp_path: Path) -> None:
     assert line == (
         f"fibre files start from different models, {A}: 3state_coop, {B}: 2state_coop; give one for all with --model"
     )
-    assert len(read_fibres(bags, [A, str(other)], "2state_coop")) == 2
+    assert len(read_fibres(bags, [load_fibre(name, "2state_coop") for name in (A, other)])) == 2
 
 
 @pytest.mark.parametrize("fibers", [[A], [A, B]])

@@ -49,7 +49,7 @@ def said(
 def test_where_all_is_usual_nothing_is_said() -> None:
     assert said() == []
     assert notes.of_search([], []) == []
-    assert notes.of_effort(Effort(), Effort(), {"a": 3}) == []
+    assert notes.of_effort(Effort(), {"a": 3}) == []
     assert notes.of_order(["a"]) == []
 
 
@@ -89,13 +89,13 @@ def test_an_error_beyond_the_usual_is_told_with_its_solution_and_sizes() -> None
 
 
 def test_a_quick_look_and_too_few_trials_are_said() -> None:
-    (quick,) = notes.of_effort(QUICK, Effort(), {"a": 3})
+    (quick,) = notes.of_effort(QUICK, {"a": 3})
     assert "at most 5 names in a set (else 6)" in quick
     assert "5 groups left out in turn (8), 200 repeats of the bootstrap (500)" in quick
-    assert notes.of_effort(Effort(), Effort(), {"a": 2}) == [
+    assert notes.of_effort(Effort(), {"a": 2}) == [
         "nothing could be left out of the fit: there are 2 trials, at least 3 are needed, so no mechanism is sure"
     ]
-    assert notes.of_effort(Effort(), Effort(), {"a": 7, "b": 1}) == [
+    assert notes.of_effort(Effort(), {"a": 7, "b": 1}) == [
         "nothing of fibre b could be left out of the fit: there is 1 trial, at least 3 are needed"
     ]
 

@@ -1,4 +1,4 @@
-"""Rows of the record: places of a mismatch, and its law."""
+"""Rows of the record: places of a mismatch."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from xb_muscle_ros.diagnose.noise.cells import Residual, cut, mean, rms
-from xb_muscle_ros.diagnose.noise.law import Law
 from xb_muscle_ros.diagnose.noise.significance import Significance
-from xb_muscle_ros.diagnose.rows import law_row, places
+from xb_muscle_ros.diagnose.rows import places
 from xb_muscle_ros.trials.trial import Phase
 
 PHASES = (Phase("isometric", 0.0, 0.2), Phase("test_stretch", 0.2, 0.3), Phase("hold", 0.3, 0.4))
@@ -52,13 +51,3 @@ def test_of_several_fibres_the_largest_come_first_and_not_all() -> None:
     assert [(p.fibre, p.phase) for p in found] == [("g", "test_stretch"), ("f", "hold"), ("f", "test_stretch")]
     many = places([str(k) for k in range(9)], [significance(0.001, 0.02, 0.03)] * 9)
     assert len(many) == 12
-
-
-def test_a_law_s_row_has_its_numbers() -> None:
-    law = Law(
-        np.array([0.01, 0.1]), np.array([0.2, 0.1]), np.array([3.0, 1.0]), 0.02, "force", 1, 0.7, {"constant": 0.4}
-    )
-    row = law_row("f", law)
-    assert (row.fibre, row.time_constant_s, row.scales_with, row.explained_fraction) == ("f", 0.02, "force", 0.7)
-    assert row.gain_f0_per_l0 == 4.0
-    assert (row.tau_s, row.weight_f0, row.other_scalings) == ((0.01, 0.1), (0.2, 0.1), {"constant": 0.4})

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from made_trials import FIBRE, given_fibre, trials_of, truth
 
+from xb_muscle_ros.api.diagnosing import diagnose
 from xb_muscle_ros.cli.main import main
 from xb_muscle_ros.diagnose.outputs import read
 from xb_muscle_ros.diagnose.report.traces import read_traces
-from xb_muscle_ros.diagnose.run import diagnose_bags
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
 from xb_muscle_ros.trials.bag_writing import write_trial
@@ -117,8 +117,11 @@ def test_files_are_there_and_belong_together(ran: Ran) -> None:
 def test_a_second_run_takes_what_the_first_one_kept(ran: Ran) -> None:
     found = read(ran.out)
     journal = (ran.out / "journal.jsonl").stat().st_size
-    again = diagnose_bags([ran.folder / "bags"], [FIBRE, OTHER], ran.out, True, model="3state_coop", report=False)
-    assert replace(again, seconds=0.0) == replace(found, seconds=0.0)
+    again = diagnose(
+        [ran.folder / "bags"], [FIBRE, OTHER], model="3state_coop", quick=True, processes=0,
+        journal=ran.out / "journal.jsonl", tell=lambda _: None,
+    )  # fmt: skip
+    assert replace(again.diagnosis, seconds=0.0) == replace(found, seconds=0.0)
     assert (ran.out / "journal.jsonl").stat().st_size == journal
 
 
@@ -157,8 +160,7 @@ def test_forces_that_are_none_are_refused(force: Any, said: str, tmp_path: Path)
         silent = replace(trial, force_time_s=force, force_n=force)
     write_trial(tmp_path / "bags" / "silent", silent)
     with pytest.raises(UserError, match=said):
-        diagnose_bags([tmp_path / "bags"], FIBRE, tmp_path / "out")
-    assert not (tmp_path / "out" / "diagnosis.json").exists()
+        diagnose([tmp_path / "bags"], FIBRE)
 
 
 def test_an_older_result_is_not_written_over_unasked(ran: Ran, capsys: pytest.CaptureFixture[str]) -> None:

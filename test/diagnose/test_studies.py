@@ -10,7 +10,6 @@ import pytest
 from made_trials import FIBRE, PCAS, given_fibre, study_of, trials_of, truth
 
 from xb_muscle_ros.diagnose.component import NAMED, Component, Kind
-from xb_muscle_ros.diagnose.effort import QUICK
 from xb_muscle_ros.diagnose.outputs import Files
 from xb_muscle_ros.diagnose.result import Diagnosis, Verdict
 from xb_muscle_ros.diagnose.run import diagnose
@@ -46,7 +45,7 @@ class Done(NamedTuple):
 
 
 def diagnosed(given: Fibre, trials: list[Trial]) -> Done:
-    return Done(*diagnose([study_of(given, trials)], QUICK, 1, Options(processes=0, quiet=True)))
+    return Done(*diagnose([study_of(given, trials)], True, 1, Options(processes=0, quiet=True)))
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from xb_muscle_ros.evaluate.trials import MEASURED, Evaluated, Facts, Trials, sr
 from xb_muscle_ros.scores.estimate import Estimate, Missing
 from xb_muscle_ros.scores.force_pca import ForcePca
 from xb_muscle_ros.trials.trial import Phase, Trial
+from xb_muscle_ros.work.plain import from_plain
 
 Maker = Callable[..., Path]
 
@@ -30,7 +31,7 @@ def found_in(*paths: Path, models: tuple[str, ...] | None = ("3state_coop",), **
 
 
 def evaluated(task: dict[str, Any]) -> Evaluated:
-    return Evaluated.of_plain(json.loads(json.dumps(bags.evaluate_bag(task), allow_nan=False)))
+    return from_plain(Evaluated, json.loads(json.dumps(bags.evaluate_bag(task), allow_nan=False)))
 
 
 def rmsd(found: Evaluated, model: str = "3state_coop") -> dict[str, float | None]:

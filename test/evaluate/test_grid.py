@@ -16,6 +16,7 @@ from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.scores.redevelopment import redevelopment, restretch_end
 from xb_muscle_ros.scores.stiffness import short_range_stiffness
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
+from xb_muscle_ros.work.plain import from_plain
 
 FIBRES = ("13Dec2017a", "14Dec2017b", "18Dec2017a", "18Dec2017b", "19Dec2017a")
 
@@ -23,7 +24,7 @@ FIBRES = ("13Dec2017a", "14Dec2017b", "18Dec2017a", "18Dec2017b", "19Dec2017a")
 def simulated(model: str, fibres: tuple[str, ...] = FIBRES, settle_s: float | None = None) -> SrsTable:
     (models,) = gather(fibres, [model], None)
     tasks = grid.tasks([models], settle_s=settle_s)
-    cells = [grid.Cells.of_plain(grid.simulate(task)) for task in tasks]
+    cells = [from_plain(grid.Cells, grid.simulate(task)) for task in tasks]
     return grid.table(model, list(models.fibres.values()), tasks, cells)
 
 
@@ -63,7 +64,7 @@ def test_k_tr_is_that_of_a_recorded_release() -> None:
     assert restretched == pytest.approx(0.122)
     found = redevelopment(time_s, muscle.outputs_of(states)["force_f0"], 0.122, 5.122)
     assert found is not None
-    assert grid.simulate(task)["k_tr"].value == pytest.approx(found.k_per_s, rel=1e-3)
+    assert from_plain(grid.Cells, grid.simulate(task)).k_tr.value == pytest.approx(found.k_per_s, rel=1e-3)
 
 
 def test_a_result_is_plain_json() -> None:
@@ -72,7 +73,7 @@ def test_a_result_is_plain_json() -> None:
     (models,) = gather(["18Dec2017a"], ["2state"], None)
     (task,) = grid.tasks([models], pcas=[9.0], recoveries_s=[0.001], amplitudes_l0=[0.0, 0.0383])
     assert json.loads(json.dumps(task)) == task
-    assert json.loads(json.dumps(grid.simulate(task), allow_nan=False))["k_tr"][0] is None
+    assert json.loads(json.dumps(grid.simulate(task), allow_nan=False))["k_tr"]["value"] is None
 
 
 @pytest.fixture(scope="module")

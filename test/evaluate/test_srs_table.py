@@ -13,7 +13,7 @@ import pytest
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable, read_table, read_tables, table_of
-from xb_muscle_ros.scores.activation import CLASSES
+from xb_muscle_ros.scores.conditions import CLASSES
 
 LOW = CLASSES.index("low")
 

@@ -20,4 +20,13 @@ EFFECT: Mapping[str, Mapping[str, float]] = {
     "half_sarcomere_spread": {"hs_spread": 0.1},
     "temperature": {"warmer": 5.0},
     "phosphate": {"phosphate_detachment": 5.0},
+    # The limits that are narrowest here: what a stretch of 4 % L0 does is felt.
+    "active_force_length": {"fl_min": 0.8, "fl_max": 1.2},
+    "passive_force_length": {"fp_max": 2.0, "fl_max": 1.2},
 }
+
+BESIDE: Mapping[str, str] = {
+    "active_force_length": "3state_coop_slack",
+    "passive_force_length": "3state_coop_slack",
+}
+"""Model that a mechanism is tried with, where it does not go with ``3state_coop``."""

@@ -23,6 +23,7 @@ from xb_muscle_ros.models.registry import EXTRAS, METHODS, SWAPS, compose, split
 FIBRE = "18Dec2017a"
 RELEASED = ("2state", "3state_coop", "4state_coop", "hill_se")
 SMOOTHING = 100.0
+LENGTHS = "+active_force_length+passive_force_length"
 GRIDS = tuple(method for method in METHODS if method != "gaussian")
 
 
@@ -34,12 +35,21 @@ def _goes(name: str) -> bool:
     return True
 
 
+def _with(base: str, mechanism: str) -> str:
+    """The base with a mechanism, or its slack form where that alone has what the mechanism needs."""
+    name = with_mechanisms(base, mechanism)
+    return name if mechanism in SWAPS or _goes(name) else with_mechanisms(f"{base}_slack", mechanism)
+
+
 MODELS = [
     name
     for base in RELEASED
-    for name in (base, f"{base}_slack", *(with_mechanisms(base, mechanism) for mechanism in (*EXTRAS, *SWAPS)))
+    for name in (base, f"{base}_slack", *(_with(base, mechanism) for mechanism in (*EXTRAS, *SWAPS)))
     if _goes(name)
 ]
+# Relations that belong together, on either kind of series element that they go with.
+MODELS += [f"{base}{kind}{LENGTHS}" for base in RELEASED if base != "hill_se" for kind in ("_slack", "_rigid")]
+MODELS += [f"{name}{LENGTHS}" for name in ("hill", "hill_se")]
 HEADS = [name for name in MODELS if not name.startswith("hill")]
 CASES = [(name, "gaussian", smoothing) for name in MODELS for smoothing in (0.0, SMOOTHING)]
 CASES += [(name, "characteristics", smoothing) for name in HEADS for smoothing in (0.0, SMOOTHING)]

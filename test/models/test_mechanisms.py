@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
-from mechanism_effects import EFFECT
+from mechanism_effects import BESIDE, EFFECT
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.composition import Composition
@@ -49,11 +49,15 @@ def test_every_mechanism_has_its_case_here() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("mechanism", EXTRAS)
 def test_absent_where_its_effect_is_zero_and_felt_where_it_is_not(mechanism: str, plain: np.ndarray) -> None:
-    effect = EFFECT[mechanism]
-    nothing = force(fibre_with(mechanism, **{**effect, next(iter(effect)): 0.0}))
-    # The other half-sarcomere's moments move with the tolerance of a step.
-    np.testing.assert_allclose(nothing, plain, atol=2e-5 if mechanism == "half_sarcomere_spread" else 1e-12)
-    felt = force(fibre_with(mechanism, **effect))
+    effect, base = EFFECT[mechanism], BESIDE.get(mechanism, BASE)
+    if base != BASE:
+        plain = force(fibre_with(None, base=base))
+    if mechanism != "active_force_length":
+        # No value makes every length an optimal one.
+        nothing = force(fibre_with(mechanism, base=base, **{**effect, next(iter(effect)): 0.0}))
+        # The other half-sarcomere's moments move with the tolerance of a step.
+        np.testing.assert_allclose(nothing, plain, atol=2e-5 if mechanism == "half_sarcomere_spread" else 1e-12)
+    felt = force(fibre_with(mechanism, base=base, **effect))
     assert np.max(np.abs(felt - plain)) > 1e-3
 
 
@@ -62,7 +66,8 @@ def test_states_stay_within_their_bounds_through_fast_movement(mechanism: str) -
     """One that leaves them would raise; what comes out is finite at any calcium."""
     length = np.interp(TIME, [0.0, 0.05, 0.07, 0.2, 0.22, 0.5], [0.0, 0.0, 0.06, 0.06, -0.02, -0.02])
     for pca in (4.5, 6.3, 9.0):
-        assert np.all(np.isfinite(force(fibre_with(mechanism, **EFFECT[mechanism]), pca, length)))
+        fibre = fibre_with(mechanism, base=BESIDE.get(mechanism, BASE), **EFFECT[mechanism])
+        assert np.all(np.isfinite(force(fibre, pca, length)))
 
 
 @pytest.mark.slow

@@ -190,6 +190,46 @@ def test_an_inner_force_of_the_length_itself_is_refused() -> None:
         tried(block)
 
 
+def test_an_inner_force_of_the_half_sarcomeres_length_is_taken_if_its_stiffness_is_right() -> None:
+    def block(factor: float) -> Any:
+        return made(
+            needs=Needs.SEPARATE_LENGTHS,
+            force=None,
+            inner_force=lambda self, q: q.own_drag * q.sarcomere_change,
+            inner_kinetics=lambda self, q: (0, factor * q.own_drag / q.gamma),
+        )
+
+    tried(block(1.0), "3state_coop_slack", "hill_se")
+    with pytest.raises(UserError, match="at a ce_velocity of 5 power strokes/s its states change inner_force"):
+        tried(block(2.0), "3state_coop_slack", "hill_se")
+
+
+@pytest.mark.parametrize(
+    ("share", "told"),
+    [
+        (lambda self, q: (1 - q.own_drag * q.sarcomere_change**2, -2 * q.own_drag * q.sarcomere_change), None),
+        (lambda self, q: (1 - q.own_drag * q.sarcomere_change**2, 0), "force_share changes by"),
+        (lambda self, q: (1 + q.own_drag * q.sarcomere_change, q.own_drag), "force_share is 1.0003; give 0 to 1"),
+        (lambda self, q: (1 - q.own_drag * q.q0, 0), "asks for 'q0'.*force_share may ask for sarcomere_change and"),
+    ],
+)
+def test_a_share_of_force_is_one_and_its_slope_its_own(share: Any, told: str | None) -> None:
+    block = made(needs=Needs.SEPARATE_LENGTHS, force=None, force_share=share)
+    if told is None:
+        tried(block, "3state_coop_slack", "hill_se")
+    else:
+        with pytest.raises(UserError, match=told):
+            tried(block, "3state_coop_slack", "hill_se")
+
+
+def test_geometry_has_no_entry_and_needs_none() -> None:
+    members = {"geometry": True, "parameters": (DRAG._replace(default=0.1),)}
+    block = made(entry=None, **members)
+    checking.refuse_incomplete((*BLOCKS, block))
+    tried(block)
+    assert "it says geometry = True and has an entry" in refused(made(**members))
+
+
 @pytest.mark.parametrize("what", WRONG)
 def test_what_is_wrong_is_refused(what: str) -> None:
     members, told = WRONG[what]

@@ -44,7 +44,7 @@ def said(verdict: str, stated: dict[str, float], **more: Any) -> dict[str, Any]:
     for name, probability in sorted(stated.items(), key=lambda item: -item[1]):
         known = name in FAMILY
         family = FAMILY[Name(name)] if known else name
-        members = [name] if known else [member.value for member in FAMILY if FAMILY[member] == name]
+        members = [name] if known else [member for member in FAMILY if FAMILY[member] == name]
         artefact = Name(members[0]) in (Name.PCA_SHIFT, Name.FORCE_DRIFT, Name.FORCE_OFFSET, Name.RUN_DOWN)
         rows.append(
             {

@@ -26,7 +26,7 @@ from xb_muscle_ros.prove.generator.world import Mesh, World, isometric
 from xb_muscle_ros.prove.generator.writing import key_entry
 from xb_muscle_ros.prove.sealing import COMPOSITES, digest, load_benchmark
 
-DRAG, TITIN = Name.VISCOUS_DRAG.value, Name.STATIC_CALCIUM_STIFFNESS.value
+DRAG, TITIN = Name.VISCOUS_DRAG, Name.STATIC_CALCIUM_STIFFNESS
 COARSE = Mesh(steps=1, dx=0.2)
 
 
@@ -39,9 +39,7 @@ def pair() -> Composite:
 @pytest.fixture(scope="module")
 def artefact() -> Composite:
     """A case with an artefact beyond the ordinary."""
-    return make_composite(
-        Spec("artefact", (), (), "3state_coop", (Name.FORCE_DRIFT.value, Name.PCA_SHIFT.value), 8), 7, 2
-    )
+    return make_composite(Spec("artefact", (), (), "3state_coop", (Name.FORCE_DRIFT, Name.PCA_SHIFT), 8), 7, 2)
 
 
 @pytest.fixture(scope="module")
@@ -138,8 +136,8 @@ def test_ordinary_artefacts_have_their_sizes(planned: list[Planned]) -> None:
     drawn = [draw_ordinary(np.random.default_rng(seed), planned) for seed in range(300)]
     shifts = np.array([list(artefacts.pca_shift.values()) for artefacts in drawn])
     offsets = np.array([artefacts.force_offset for artefacts in drawn])
-    assert np.std(shifts) == pytest.approx(ORDINARY[Name.PCA_SHIFT.value], rel=0.1)
-    assert np.std(offsets) == pytest.approx(ORDINARY[Name.FORCE_OFFSET.value], rel=0.1)
+    assert np.std(shifts) == pytest.approx(ORDINARY[Name.PCA_SHIFT], rel=0.1)
+    assert np.std(offsets) == pytest.approx(ORDINARY[Name.FORCE_OFFSET], rel=0.1)
     assert np.std([artefacts.time_shift for artefacts in drawn]) == pytest.approx(7e-4, rel=0.15)
     assert np.std([artefacts.length_gain for artefacts in drawn]) == pytest.approx(0.01, rel=0.15)
     run_down = np.array([artefacts.run_down for artefacts in drawn])
@@ -150,7 +148,7 @@ def test_ordinary_artefacts_have_their_sizes(planned: list[Planned]) -> None:
 
 @pytest.mark.parametrize("name", ARTEFACTS)
 def test_artefact_is_beyond_the_ordinary(name: str, planned: list[Planned]) -> None:
-    assert set(ARTEFACTS) == {artefact.value for artefact in MEASUREMENT}
+    assert set(ARTEFACTS) == set(MEASUREMENT)
     ordinary = Artefacts(
         {trial.pca: 0.01 for trial in planned}, 0.001, 0.001, tuple(0.001 for _ in planned), (), 1e-4
     )  # fmt: skip
@@ -240,7 +238,7 @@ def test_mix_has_every_kind() -> None:
         assert len({FAMILY[Name(label)] for label in spec.artefacts}) == len(spec.artefacts)
         assert all(spec.model in EFFECTS[label].models for label in spec.labels)
     used = collections.Counter(label for spec in made for label in spec.labels if label not in OUTSIDE)
-    assert set(used) == {name.value for name in MECHANISMS} - {Name.TEMPERATURE.value, Name.PHOSPHATE.value}
+    assert set(used) == set(MECHANISMS) - {Name.TEMPERATURE, Name.PHOSPHATE}
     assert max(used.values()) - min(used.values()) <= 2
     sizes = np.array([size for spec in made for size in spec.sizes])
     assert 0.003 <= sizes.min() < sizes.max() <= 0.05

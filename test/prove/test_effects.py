@@ -36,7 +36,7 @@ def changes(worlds: dict[str, World], study: list[Stimulus]) -> dict[str, tuple[
 
 
 def test_every_mechanism_has_an_effect_and_some_have_no_name() -> None:
-    assert {name.value for name in MECHANISMS} == set(EFFECTS) - set(OUTSIDE)
+    assert set(MECHANISMS) == set(EFFECTS) - set(OUTSIDE)
     assert len(OUTSIDE) >= 4
     assert all(label.startswith("outside:") for label in OUTSIDE)
 
@@ -53,39 +53,39 @@ def test_effect_changes_force(label: str, changes: dict[str, tuple[list[Array], 
 
 
 def test_drag_is_there_while_length_changes_only(changes: dict[str, tuple[list[Array], list[Array]]]) -> None:
-    for change in changes[Name.VISCOUS_DRAG.value][1]:
+    for change in changes[Name.VISCOUS_DRAG][1]:
         assert np.all(change[STRETCH] > 1e-3)
         assert np.all(change[:201] == 0.0)
         assert np.all(change[HOLD] == 0.0)
 
 
 def test_relaxation_goes_on_in_the_hold(changes: dict[str, tuple[list[Array], list[Array]]]) -> None:
-    change = changes[Name.PASSIVE_VISCOELASTICITY.value][1][RELAXED]
+    change = changes[Name.PASSIVE_VISCOELASTICITY][1][RELAXED]
     assert change[284] > 2.0 * change[-1] > 0.0
 
 
 @pytest.mark.parametrize("name", [Name.ACTIVE_TITIN, Name.STATIC_CALCIUM_STIFFNESS])
 def test_calcium_stiffens_titin(name: Name, changes: dict[str, tuple[list[Array], list[Array]]]) -> None:
-    change = changes[name.value][1]
+    change = changes[name][1]
     assert np.max(np.abs(change[RELAXED])) < 1e-6
     assert 0.0 < change[HALF][-1] < change[FULL][-1]
 
 
 @pytest.mark.parametrize("name", [Name.LENGTH_DEPENDENT_ACTIVATION, Name.STRAIN_RECRUITED_HEADS])
 def test_submaximal_only(name: Name, changes: dict[str, tuple[list[Array], list[Array]]]) -> None:
-    change = changes[name.value][1]
+    change = changes[name][1]
     assert change[HALF][-1] > 3.0 * abs(change[FULL][-1])
     assert change[HALF][-1] > 10.0 * abs(change[RELAXED][-1])
 
 
 def test_tearing_caps_the_end_of_a_stretch(changes: dict[str, tuple[list[Array], list[Array]]]) -> None:
-    change = changes[Name.FORCIBLE_DETACHMENT.value][1][FULL]
+    change = changes[Name.FORCIBLE_DETACHMENT][1][FULL]
     assert change[284] < -1e-3
     assert abs(change[100]) < 1e-3 * abs(change[284]) + 1e-4
 
 
 def test_weak_heads_bear_force_where_sites_are_active(changes: dict[str, tuple[list[Array], list[Array]]]) -> None:
-    change = changes[Name.WEAKLY_BOUND_HEADS.value][1]
+    change = changes[Name.WEAKLY_BOUND_HEADS][1]
     assert change[FULL][220] > change[HALF][220] > 10.0 * abs(change[RELAXED][220])
 
 

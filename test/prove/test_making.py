@@ -28,7 +28,7 @@ from xb_muscle_ros.trials.bags import find_bags, read_trial
 @pytest.fixture(scope="module")
 def case() -> Single:
     """A case with something concealed."""
-    return make_single(Spec("single", (Name.STATIC_CALCIUM_STIFFNESS.value,), (0.01,), "3state_coop"), 7, 1)
+    return make_single(Spec("single", (Name.STATIC_CALCIUM_STIFFNESS,), (0.01,), "3state_coop"), 7, 1)
 
 
 @pytest.mark.slow
@@ -51,7 +51,7 @@ def test_case_follows_from_its_seed(case: Single) -> None:
 
 def test_case_tells_nothing_but_what_was_recorded(case: Single, tmp_path: Path) -> None:
     write_case(tmp_path / "case_0001", case, "fibre_0001", "gaussian")
-    words = [name.value for name in (*MECHANISMS, *MEASUREMENT)] + [label.removeprefix("outside:") for label in OUTSIDE]
+    words = [*MECHANISMS, *MEASUREMENT] + [label.removeprefix("outside:") for label in OUTSIDE]
     words += ["single", "outside", "conceal", "effect", case.fibre, '"scale"']
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert len(files) == 15
@@ -94,7 +94,7 @@ def test_mix_has_every_kind_and_mechanism() -> None:
     kinds = collections.Counter(spec.kind for spec in made)
     assert kinds == {"null": 40, "artefact": 40, "single": 80, "pair": 20, "outside": 20}
     by_label = collections.Counter(spec.labels[0] for spec in made if spec.kind == "single")
-    assert set(by_label) == {name.value for name in MECHANISMS}
+    assert set(by_label) == set(MECHANISMS)
     assert max(by_label.values()) - min(by_label.values()) <= 1
     sizes = collections.Counter(spec.size for spec in made if spec.kind == "single")
     assert set(sizes) == set(SIZES)
@@ -109,7 +109,7 @@ def test_class_is_the_highest_that_is_reached() -> None:
 
 @pytest.mark.parametrize("name", PRIORS)
 def test_artefact_changes_the_recording(name: str, case: Single) -> None:
-    assert set(PRIORS) == {artefact.value for artefact in MEASUREMENT}
+    assert set(PRIORS) == set(MEASUREMENT)
     artefacts = draw_artefact(name, np.random.default_rng(1), case.study)
     force = np.interp(np.arange(500), [0, 100, 200, 500], [0.2, 0.2, 0.5, 0.3])
     changed = artefacts.pca_shift or artefacts.length_gain or not np.array_equal(artefacts.recorded(force, 3), force)

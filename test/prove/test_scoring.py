@@ -13,6 +13,7 @@ import pytest
 from sample_diagnoses import nothing
 
 from xb_muscle_ros.cli.main import main
+from xb_muscle_ros.diagnose import intake, outputs
 from xb_muscle_ros.diagnose.component import Component, Kind
 from xb_muscle_ros.diagnose.names import FAMILY, MEASUREMENT, Name
 from xb_muscle_ros.diagnose.residual import Place
@@ -129,8 +130,7 @@ def diagnosed(found: dict[str, Any]) -> Diagnosis:
     plain, first = nothing().diagnosis, found["first_mismatch"]
     named = [Name(name) for name in found["answer"]]
     components = tuple(
-        Component(n.value, Kind.ARTEFACT if n in MEASUREMENT else Kind.MECHANISM, FAMILY[n], (n.value,), 0.8)
-        for n in named
+        Component(n, Kind.ARTEFACT if n in MEASUREMENT else Kind.MECHANISM, FAMILY[n], (n,), 0.8) for n in named
     )
     held = {
         when: replace(getattr(plain, when), heldout_rmsd_f0=found.get(f"{when}_heldout_f0"))
@@ -140,7 +140,7 @@ def diagnosed(found: dict[str, Any]) -> Diagnosis:
     return replace(
         plain,
         verdict=Verdict(found["verdict"]),
-        answer=tuple(n.value for n in named if n not in MEASUREMENT),
+        answer=tuple(n for n in named if n not in MEASUREMENT),
         components=components,
         mismatch=(place,) if place else (),
         **held,
@@ -148,21 +148,19 @@ def diagnosed(found: dict[str, Any]) -> Diagnosis:
 
 
 def _tool(monkeypatch: pytest.MonkeyPatch, seen: list[str]) -> None:
-    """A stand-in for the tool that knows the answers of `SAID`."""
+    """A stand-in for the tool that knows the answers of `SAID`; its studies are names of cases."""
 
-    def diagnose_bags(
-        bags: Any, fiber: Path, out: Path, quick: bool = False, seed: int = 1, report: bool = True
-    ) -> Diagnosis:
-        name = fiber.parent.name
-        seen.append(name)
-        if name == "case_0010":
+    def diagnose(studies: str, quick: bool, seed: int, options: Options) -> tuple[Diagnosis, None]:
+        seen.append(studies)
+        if studies == "case_0010":
             raise UserError("no force")
-        return diagnosed(SAID[name])
+        return diagnosed(SAID[studies]), None
 
     module = types.ModuleType("xb_muscle_ros.diagnose.run")
-    module.diagnose_bags = diagnose_bags  # type: ignore[attr-defined]
+    module.diagnose = diagnose  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, "xb_muscle_ros.diagnose.run", module)
-    monkeypatch.setattr("xb_muscle_ros.trials.bags.find_bags", lambda paths: list(paths))
+    monkeypatch.setattr(intake, "read_fibres", lambda bags, fibers: fibers[0].parent.name)
+    monkeypatch.setattr(outputs, "write", lambda out, found, files, report: None)
 
 
 def test_run_then_score(benchmark_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

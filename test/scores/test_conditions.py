@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xb_muscle_ros.scores.activation import CLASSES, UNKNOWN, activation_class
-from xb_muscle_ros.scores.conditions import CONDITIONS, LARGE, SHAPE, sets
+from xb_muscle_ros.scores.conditions import CLASSES, CONDITIONS, LARGE, SHAPE, UNKNOWN, activation_class, sets
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,9 +11,7 @@ from xb_muscle_ros.api.inputs import FibreLike, TrialsLike, kept, known_of, path
 from xb_muscle_ros.api.tables import dataframe, drawn
 from xb_muscle_ros.api.telling import Lines, Tell
 from xb_muscle_ros.diagnose.component import Component
-from xb_muscle_ros.diagnose.effort import QUICK, Effort
 from xb_muscle_ros.diagnose.error_sds import error_sd_lines, error_sds_of
-from xb_muscle_ros.diagnose.feature_tables import read_features
 from xb_muscle_ros.diagnose.intake import given_twice, read_fibres, studies_of
 from xb_muscle_ros.diagnose.outputs import Files, older_results, write
 from xb_muscle_ros.diagnose.report.prose import headline, summary
@@ -103,33 +101,14 @@ class DiagnosisResult:
         Raises:
             UserError: this diagnosis has no such figure.
         """
-        draw = self._figures()
-        if which not in draw:
-            raise UserError(f"figure '{which}' is not known; known: {', '.join(draw)}")
+        from xb_muscle_ros.diagnose.report.figures import FIGURES
+
+        if which not in FIGURES:
+            raise UserError(f"figure '{which}' is not known; known: {', '.join(FIGURES)}")
         try:
-            return drawn(draw[which])
+            return drawn(lambda: FIGURES[which](self.diagnosis, self.files.traces))
         except UserError:
             raise UserError(f"this diagnosis has nothing to show in figure '{which}'") from None
-
-    def _figures(self) -> dict[str, Callable[[], object]]:
-        from xb_muscle_ros.diagnose.report.figures import (
-            before_after,
-            contributions,
-            fibres,
-            laws,
-            probabilities,
-            residual_map,
-        )
-
-        d, traces = self.diagnosis, self.files.traces
-        return {
-            "before_after": lambda: before_after.draw_before_after(d, traces),
-            "probabilities": lambda: probabilities.draw_probabilities(d),
-            "contributions": lambda: contributions.draw_contributions(d, traces),
-            "fibres": lambda: fibres.draw_fibres(d),
-            "map": lambda: residual_map.draw_map(d),
-            "laws": lambda: laws.draw_laws(d),
-        }
 
     def save(self, folder: str | Path, *, overwrite: bool = False) -> tuple[Path, ...]:
         """Write report, ``diagnosis.json``, traces, augmented fibre files and the next experiment's bag.
@@ -179,19 +158,14 @@ def diagnose(
             are found by the fibre's name.
         model: parameter set of the fibre files; None: the one that the files name.
         method: how heads are distributed over strain; None: the files'.
-        reference_length: see `read_trials`; of bags only.
-        f0: see `read_trials`; of bags only.
-        trials_of: see `read_trials`; of bags only.
+        reference_length, f0, trials_of: see `read_trials`; of bags only.
         features: JSON table of measured SRS (F0/L0) and isometric force (F0) to be met beside the traces.
         predict: such a table that is predicted and compared, never fitted.
         nuisance: SDs of ordinary measurement errors where the study knows better, by name, such as
             ``{"time_shift": 0.002}`` (s).
         quick: look less hard: minutes become tens of seconds.
         seed: of the bootstrap.
-        processes: of this machine; None: one per core, 0: this process.
-        scheduler: address of a Dask scheduler whose workers do the work.
-        journal: file that keeps finished work, so that an interrupted diagnosis goes on where it was.
-        progress: show progress on stderr.
+        processes, scheduler, journal, progress: see `fit`.
         tell: hears each warning; None: a `DataWarning` each.
 
     Returns:
@@ -221,9 +195,7 @@ def diagnose(
         studies = studies_of(kept(in_memory, known, trials_of), fibres)
     else:
         studies = read_fibres(paths, fibres, known=known, only=trials_of)
-    of_fibres = {study.fibre.name: study.trials for study in studies}
-    data, table = (None if path is None else read_features(Path(path), of_fibres) for path in (features, predict))
-    found, files = diagnosed(studies, QUICK if quick else Effort(), seed, work, data, table, sds)
+    found, files = diagnosed(studies, quick, seed, work, features, predict, sds)
     found = replace(found, notes=(*found.notes, *given_twice(paths)))
     lines = Lines(tell)
     lines.say(*found.warnings, *found.notes)

@@ -12,8 +12,7 @@ from xb_muscle_ros.api.inputs import FibreLike, TrialsLike, kept, known_of, path
 from xb_muscle_ros.api.tables import dataframe, drawn
 from xb_muscle_ros.api.telling import Lines, Tell
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.evaluate.csv_rows import relative_rows, trial_rows
-from xb_muscle_ros.evaluate.force_scores import force_rows
+from xb_muscle_ros.evaluate.csv_rows import tables
 from xb_muscle_ros.evaluate.report import comparison_table, force_table, srs_table_text
 from xb_muscle_ros.evaluate.request import Request
 from xb_muscle_ros.evaluate.results import Results
@@ -72,22 +71,15 @@ class EvaluationResult:
         """One of the tables; columns as in the CSV file of its name.
 
         Args:
-            table: ``trials``, ``force_rmsd`` or ``relative_srs``.
+            table: ``trials``, ``force_rmsd``, ``relative_srs``, ``srs_cells`` or ``srs_rmsd``.
 
         Raises:
             UserError: pandas is not there, or the evaluation has no such table.
         """
-        results, found = self.results, self.results.sections.force_rmsd
-        rows: dict[str, Any] = {}
-        if results.trials is not None:
-            rows["trials"] = lambda: trial_rows(results.trials)
-        if found is not None and found.overall:
-            rows["force_rmsd"] = lambda: force_rows(found)
-        if results.data is not None:
-            rows["relative_srs"] = lambda: relative_rows(results.tables, results.data)
+        rows = tables(self.results)
         if table not in rows:
             raise UserError(f"table '{table}' is not among those of this evaluation{suggest(table, rows)}")
-        return dataframe(rows[table]())
+        return dataframe(rows[table])
 
     def plot(self, which: str | None = None) -> Figure:
         """One of the figures that ``xb_muscle evaluate`` draws.
@@ -147,19 +139,15 @@ def evaluate(
         fibre: names, fibre files or `Fibre`, one or several; empty: the package's file of a trial's fibre.
         model: parameter sets, one or several; None: all that the fibre files have.
         method: how heads are distributed over strain; None: the files'.
-        reference_length: see `read_trials`; of bags only.
-        f0: see `read_trials`; of bags only.
-        trials_of: see `read_trials`; of bags only.
+        reference_length, f0, trials_of: see `read_trials`; of bags only.
         settle: isometric time before each trial, s; None: until at rest.
         measured_only: the recordings alone, without models.
         skip_bad: leave recordings that cannot be evaluated out, in place of refusing all.
         empirical: JSON table of measured SRS; asks for the paper's grid of conditions.
         golden: JSON table of the authors' output, to be compared.
-        processes: of this machine; None: one per core, 0: this process.
-        scheduler: address of a Dask scheduler whose workers do the work.
+        processes, scheduler, progress: see `fit`.
         out: folder that keeps finished work, so that an interrupted evaluation goes on where it was; None: nothing is
             kept.
-        progress: show progress on stderr.
         tell: hears each line on what was left out or taken for granted; None: a `DataWarning` each.
 
     Returns:

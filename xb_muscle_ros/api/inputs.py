@@ -15,6 +15,7 @@ from xb_muscle_ros.models.strain_bins import wide_bins_line
 from xb_muscle_ros.trials.bag_files import plain
 from xb_muscle_ros.trials.bag_writing import write_trial
 from xb_muscle_ros.trials.completing import Known
+from xb_muscle_ros.trials.readers.description import FIRST_ISOMETRIC
 from xb_muscle_ros.trials.readers.units import quantity
 from xb_muscle_ros.trials.study import alike, read_study
 from xb_muscle_ros.trials.trial import Trial
@@ -28,7 +29,6 @@ FibreLike: TypeAlias = str | Path | Fibre
 PathOrTrial: TypeAlias = str | Path | Trial
 TrialsLike: TypeAlias = Union[PathOrTrial, Sequence[PathOrTrial], "SimulationResult"]
 """Bags or folders of bags, trials in memory, or what `simulate` returned."""
-FIRST_ISOMETRIC = "first_isometric"
 
 
 def fibre_of(
@@ -39,14 +39,7 @@ def fibre_of(
     lines: Lines,
     for_fit: bool = False,
 ) -> Fibre:
-    """The fibre that the arguments pick; what it lacks of its own is said.
-
-    Args:
-        fibre: name, path or fibre.
-        model, method: of the fibre file; None: the file's.
-        values: other values of parameters, by name.
-        lines: hear what there is to say.
-        for_fit: what the fibre lacks is to be fitted, see `load_fibre`.
+    """The fibre that the arguments pick, with other values of parameters by name; what it lacks of its own is said.
 
     Raises:
         UserError: see `picked` and `changed`.
@@ -123,21 +116,8 @@ def paths_and_trials(trials: TrialsLike) -> tuple[list[str | Path], list[Trial]]
     return paths, in_memory
 
 
-def trials_of(
-    trials: TrialsLike,
-    fibre: Fibre,
-    known: Known,
-    only: str | None,
-    lines: Lines,
-) -> list[Trial]:
-    """Trials in memory, or those of the bags, complete and checked.
-
-    Args:
-        trials: given.
-        fibre: whose parameters are used.
-        known: what the user knows of L0 and F0.
-        only: take trials of this fibre and no other.
-        lines: hear what there is to say.
+def trials_of(trials: TrialsLike, fibre: Fibre, known: Known, only: str | None, lines: Lines) -> list[Trial]:
+    """Trials in memory, or those of the bags, complete and checked; see `read_study`.
 
     Raises:
         UserError: see `read_study`; options of bags with trials in memory.
@@ -173,14 +153,7 @@ def work_of(
     progress: bool = True,
     label: str = "",
 ) -> Options:
-    """Where long work is done.
-
-    Args:
-        processes: of this machine; None: one per core, 0: this process.
-        scheduler: address of a Dask scheduler.
-        journal: file that keeps finished work.
-        progress: show it on stderr.
-        label: shown before the progress bar.
+    """Where long work is done, see `work.Options`.
 
     Raises:
         UserError: options that are out of range or against each other.

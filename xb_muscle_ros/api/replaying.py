@@ -113,9 +113,7 @@ def replay(
         model: parameter set of the fibre file; None: the file's default.
         method: how heads are distributed over strain; None: the file's.
         set: other values of parameters, by name.
-        reference_length: see `read_trials`; of bags only.
-        f0: see `read_trials`; of bags only.
-        trials_of: see `read_trials`; of bags only.
+        reference_length, f0, trials_of: see `read_trials`; of bags only.
         substeps: steps between two samples; 1 is what the node does.
         settle: isometric time before each trial, s; None: until at rest.
         live: play the trials through a running ``muscle_node`` in lockstep.

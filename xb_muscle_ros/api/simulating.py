@@ -123,9 +123,7 @@ def simulate(
 
     Args:
         fibre: name, fibre file or `Fibre`.
-        model: parameter set of the fibre file; None: the file's default.
-        method: how heads are distributed over strain; None: the file's.
-        set: other values of parameters, by name.
+        model, method, set: see `replay`.
         pca: of the bathing solution, one or several.
         amplitude: of the conditioning stretch, L0, one or several; 0: none.
         recovery: time before the test stretch, s, one or several.
@@ -157,15 +155,7 @@ def simulate(
         >>> made.simulated[0].force_n.shape
         (200,)
     """
-    for option, given in (
-        ("pca", pca),
-        ("amplitude", amplitude),
-        ("recovery", recovery),
-        ("rate", rate),
-        ("settle", settle),
-    ):
-        for number in [] if given is None else _several(given):
-            ALLOWED[_RANGES[option]].check(f"--{option}", number)
+    check_numbers(pca=pca, amplitude=amplitude, recovery=recovery, rate=rate, settle=settle)
     lines = Lines(tell)
     chosen = fibre_of(fibre, model, method, set, lines)
     if not (time is None and length is None and calcium is None):
@@ -195,11 +185,9 @@ def protocols(
     fibre: Fibre, pca: Sequence[float], amplitude: Sequence[float], recovery: Sequence[float], rate: float
 ) -> list[tuple[StretchShortenStretch, Trial]]:
     """Every combination as a protocol and its trial without force."""
-    made = []
-    for each_pca, each_amplitude, each_recovery in itertools.product(pca, amplitude, recovery):
-        protocol = StretchShortenStretch(each_amplitude, each_recovery)
-        made.append((protocol, protocol.trial(fibre.name, each_pca, rate)))
-    return made
+    conditions = itertools.product(pca, amplitude, recovery)
+    planned = [(each_pca, StretchShortenStretch(*condition)) for each_pca, *condition in conditions]
+    return [(protocol, protocol.trial(fibre.name, each_pca, rate)) for each_pca, protocol in planned]
 
 
 def simulations(

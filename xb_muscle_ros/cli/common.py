@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import inspect
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from xb_muscle_ros.models.fibre_file import Fibre
-    from xb_muscle_ros.trials.completing import Known
-    from xb_muscle_ros.trials.study import Study
+    from xb_muscle_ros.trials.trial import Trial
     from xb_muscle_ros.work import Options
+
+R = TypeVar("R")
 
 
 def add_bags(parser: argparse.ArgumentParser, nargs: str = "+") -> None:
@@ -23,14 +26,7 @@ def add_bags(parser: argparse.ArgumentParser, nargs: str = "+") -> None:
 
 
 def add_fibre(parser: argparse.ArgumentParser, default: str | None = None, several: bool = False, **more: Any) -> None:
-    """The option that picks a fibre.
-
-    Args:
-        parser: of the command.
-        default: the fibre without it.
-        several: it takes more than one.
-        more: further settings of the option.
-    """
+    """The option that picks a fibre, or `several`; `more` are further settings of the option."""
     told = "fibre file, or name of a fibre in the package" + (f" (default {default})" if default else "")
     lists = {"nargs": "+", "action": "extend", "metavar": "FIBER", "default": []} if several else {}
     settings = {"dest": "fiber", "default": default, "help": told, **lists, **more}
@@ -61,41 +57,24 @@ def add_settle(parser: argparse.ArgumentParser) -> None:
 
 
 def add_out(parser: argparse.ArgumentParser, what: str, default: str | None = None, metavar: str = "DIR") -> None:
-    """Where results go, and whether they may take the place of older ones.
-
-    Args:
-        parser: of the command.
-        what: is written there.
-        default: None: it has to be given.
-        metavar: what is named.
-    """
+    """Where results go (without a default the option has to be given), and whether they may replace older ones."""
     text = what if default is None else f"{what} (default {default})"
     out = None if default is None else Path(default)
     parser.add_argument("--out", type=Path, metavar=metavar, required=default is None, default=out, help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace the results of an older run")
 
 
-def fibre_of(arguments: argparse.Namespace, for_fit: bool = False) -> Fibre:
-    """The fibre that the options pick; says what it lacks of its own, a line each.
-
-    Args:
-        arguments: parsed.
-        for_fit: what it lacks is to be fitted, see `load_fibre`.
-    """
+def fibre_of(arguments: argparse.Namespace) -> Fibre:
+    """The fibre that the options pick; says what it lacks of its own, a line each; see `inputs.fibre_of`."""
     from xb_muscle_ros.api import inputs
     from xb_muscle_ros.api.telling import Lines
 
     changes = dict(arguments.changes)
-    return inputs.fibre_of(arguments.fiber, arguments.model, arguments.method, changes, Lines(warn), for_fit)
+    return inputs.fibre_of(arguments.fiber, arguments.model, arguments.method, changes, Lines(warn))
 
 
 def add_reading(parser: argparse.ArgumentParser, several: bool = False) -> None:
-    """Options on how bags are read.
-
-    Args:
-        parser: of the command.
-        several: the command takes trials of several fibres in one run.
-    """
+    """Options on how bags are read; `several`: the command takes trials of several fibres in one run."""
     parser.add_argument(
         "--reference-length", metavar="LENGTH",
         help="the length that is L0, for example '30 mm', or 'first_isometric': the length before the first stretch "
@@ -109,29 +88,13 @@ def add_reading(parser: argparse.ArgumentParser, several: bool = False) -> None:
     parser.add_argument("--trials-of", metavar="FIBER", help=f"take this fibre's trials of the bags (default: {whose})")
 
 
-def known_of(arguments: argparse.Namespace) -> Known:
-    """What the options tell of L0 and F0.
-
-    Raises:
-        UserError: an option is no length or no force.
-    """
+def trials_of(arguments: argparse.Namespace, fibre: Fibre) -> list[Trial]:
+    """The trials of the bags that the options name; what there is to say of them is said; see `inputs.trials_of`."""
     from xb_muscle_ros.api import inputs
+    from xb_muscle_ros.api.telling import Lines
 
-    return inputs.known_of(arguments.reference_length, arguments.f0)
-
-
-def study_of(arguments: argparse.Namespace, fibre: Fibre) -> Study:
-    """The trials of the bags that the options name; what there is to say of them is said.
-
-    Raises:
-        UserError: see `read_study`.
-    """
-    from xb_muscle_ros.trials.study import read_study
-
-    study = read_study(arguments.bags, fibre.name, known_of(arguments).of_file(fibre), arguments.trials_of)
-    for line in study.lines:
-        warn(line)
-    return study
+    known = inputs.known_of(arguments.reference_length, arguments.f0)
+    return inputs.trials_of(arguments.bags, fibre, known, arguments.trials_of, Lines(warn))
 
 
 def _change(text: str) -> tuple[str, float]:
@@ -155,19 +118,22 @@ def add_work(parser: argparse.ArgumentParser) -> None:
 
 
 def work_options_of(arguments: argparse.Namespace, label: str = "", journal: Path | None = None) -> Options:
-    """Where the options want work done.
-
-    Args:
-        arguments: parsed.
-        label: shown before the progress bar.
-        journal: file that keeps finished results.
-
-    Raises:
-        UserError: options that are out of range or against each other.
-    """
+    """Where the options want work done; see `inputs.work_of`."""
     from xb_muscle_ros.api import inputs
 
     return inputs.work_of(arguments.processes, arguments.scheduler, journal, label=label)
+
+
+def called(function: Callable[..., R], arguments: argparse.Namespace, *first: object, **more: object) -> R:
+    """What a function answers to the arguments that are called like its parameters.
+
+    Args:
+        function: one of the public ones.
+        first: its first arguments.
+        more: its parameters that the command line has by other names, or not as they are; they go first.
+    """
+    named = inspect.signature(function).parameters.keys() & vars(arguments).keys()
+    return function(*first, **({name: getattr(arguments, name) for name in named} | more))
 
 
 def warn(message: str) -> None:

@@ -53,21 +53,11 @@ def run(arguments: argparse.Namespace) -> int:
 
     out: Path = arguments.out
     refuse_older(older_results(out), arguments.overwrite)
-    found = diagnose(
+    found = common.called(
+        diagnose,
+        arguments,
         arguments.bags,
         arguments.fiber,
-        model=arguments.model,
-        method=arguments.method,
-        reference_length=arguments.reference_length,
-        f0=arguments.f0,
-        trials_of=arguments.trials_of,
-        features=arguments.features,
-        predict=arguments.predict,
-        nuisance=arguments.nuisance,
-        quick=arguments.quick,
-        seed=arguments.seed,
-        processes=arguments.processes,
-        scheduler=arguments.scheduler,
         journal=out / "journal.jsonl",
         progress=True,
         tell=lambda _: None,  # They stand in what is printed at the end.

@@ -45,25 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.paper != (arguments.empirical is not None):
         raise UserError("--paper and --empirical go together; give the table of measured SRS, empirical_srs.json")
     refuse_older(older_results(arguments.out), arguments.overwrite)
-    found = evaluate(
-        arguments.bags,
-        fibre=arguments.fiber,
-        model=arguments.model,
-        method=arguments.method,
-        reference_length=arguments.reference_length,
-        f0=arguments.f0,
-        trials_of=arguments.trials_of,
-        settle=arguments.settle,
-        measured_only=arguments.measured_only,
-        skip_bad=arguments.skip_bad,
-        empirical=arguments.empirical,
-        golden=arguments.golden,
-        processes=arguments.processes,
-        scheduler=arguments.scheduler,
-        out=arguments.out,
-        progress=True,
-        tell=common.warn,
-    )
+    found = common.called(evaluate, arguments, arguments.bags, fibre=arguments.fiber, progress=True, tell=common.warn)
     if str(found):
         print(found)
     for path in found.save(arguments.out, overwrite=True):

@@ -39,8 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     what.add_argument("--features-of", metavar="FIBER", help="whose features (default: the fibre of the trials)")
     what.add_argument("--force-pca-only", action="store_true", help="of the features, isometric force alone")
     what.add_argument(
-        "--no-anchor", action="store_true", help="do not ask for an isometric force of 1 F0 (SD 0.02) at pCa 4.5"
-    )
+        "--no-anchor", dest="anchor", action="store_false",
+        help="do not ask for an isometric force of 1 F0 (SD 0.02) at pCa 4.5",
+    )  # fmt: skip
     of = parser.add_argument_group("parameters")
     of.add_argument(
         "--free", nargs="+", metavar="NAME",
@@ -69,7 +70,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     how.add_argument("--starts", type=int, default=4, metavar="N", help="descents from different points (default 4)")
     how.add_argument("--seed", type=int, default=1, metavar="N", help="seed of the random starts (default 1)")
     how.add_argument("--level", type=float, default=0.95, metavar="P", help="of the intervals, a share (default 0.95)")
-    how.add_argument("--no-intervals", action="store_true", help="leave the profiles out: the longest part of the work")
+    how.add_argument(
+        "--no-intervals", dest="intervals", action="store_false",
+        help="leave the profiles out: the longest part of the work",
+    )  # fmt: skip
     common.add_work(parser)
 
 
@@ -79,37 +83,16 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.fit.asked import number
 
     folder = check_out(arguments.out, arguments.overwrite)
-    found = fit(
+    found = common.called(
+        fit,
+        arguments,
         arguments.bags,
         arguments.fiber,
-        model=arguments.model,
-        method=arguments.method,
         set=dict(arguments.changes),
-        reference_length=arguments.reference_length,
-        f0=arguments.f0,
-        trials_of=arguments.trials_of,
-        hold_out=arguments.hold_out,
-        train=arguments.train,
-        split=arguments.split,
-        window=arguments.window,
         weight={name: number(value, f"--weight {name}") for name, value in _pairs(arguments.weight, "--weight")},
-        free=arguments.free,
-        fix=arguments.fix,
         tie=dict(_pairs(arguments.tie, "--tie")),
         bound={name: _range(value, f"--bound {name}") for name, value in _pairs(arguments.bound, "--bound")},
         prior={name: _range(value, f"--prior {name}") for name, value in _pairs(arguments.prior, "--prior")},
-        nuisance=arguments.nuisance,
-        prior_fibers=arguments.prior_fibers,
-        features=arguments.features,
-        features_of=arguments.features_of,
-        force_pca_only=arguments.force_pca_only,
-        anchor=not arguments.no_anchor,
-        starts=arguments.starts,
-        seed=arguments.seed,
-        level=arguments.level,
-        intervals=not arguments.no_intervals,
-        processes=arguments.processes,
-        scheduler=arguments.scheduler,
         journal=folder / "journal.jsonl",
         progress=True,
         tell=common.warn,

@@ -12,49 +12,39 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.units import KINDS, UNITS
 
 if TYPE_CHECKING:
-    from xb_muscle_ros.progress import Progress
-    from xb_muscle_ros.trials.importing import Imported
     from xb_muscle_ros.trials.readers.settings import ImportSettings
     from xb_muscle_ros.trials.trial import Trial
 
 # Names of the readers; the readers themselves take time to load.
 FORMATS = ("bag", "csv", "mat", "slc")
-# option: (key of the mapping, argument type, help)
-_OPTIONS: dict[str, tuple[tuple[str, ...], type, str]] = {
-    "--trial": (("trial",), str, "name of the trial (default: the file's)"),
-    "--trial-column": (("columns", "trial", "column"), str, "column whose value tells the trials of a table apart"),
-    "--decimal": (("decimal",), str, "'point' or 'comma' (default: what the table shows)"),
-    "--fiber": (("fibre",), str, "name of the fibre"),
-    "--data-set": (("data_set",), str, "begins the names of the bags (default: the fibre)"),
-    "--source": (("source",), str, "where the data come from, in words"),
-    "--time-column": (("columns", "time", "column"), str, "column of time"),
-    "--rate": (("columns", "time", "rate"), str, "samples in a second where there is no column of time: '1000 Hz'"),
-    "--time-unit": (("columns", "time", "unit"), str, "unit of time"),
-    "--length-column": (("columns", "length", "column"), str, "column of length"),
-    "--length-unit": (("columns", "length", "unit"), str, "unit of length"),
-    "--length-is": (
-        ("columns", "length", "is"),
-        str,
-        "'absolute' length (default) or 'change' from the reference length",
-    ),
-    "--length-of": (
-        ("columns", "length", "of"),
-        str,
-        "length of the 'fibre' (default), a 'sarcomere' or a 'half_sarcomere'",
-    ),
+# option: (key of the mapping and those above it, argument type, help)
+_OPTIONS: dict[str, tuple[str, type, str]] = {
+    "--trial": ("trial", str, "name of the trial (default: the file's)"),
+    "--trial-column": ("columns.trial.column", str, "column whose value tells the trials of a table apart"),
+    "--decimal": ("decimal", str, "'point' or 'comma' (default: what the table shows)"),
+    "--fiber": ("fibre", str, "name of the fibre"),
+    "--data-set": ("data_set", str, "begins the names of the bags (default: the fibre)"),
+    "--source": ("source", str, "where the data come from, in words"),
+    "--time-column": ("columns.time.column", str, "column of time"),
+    "--rate": ("columns.time.rate", str, "samples in a second where there is no column of time: '1000 Hz'"),
+    "--time-unit": ("columns.time.unit", str, "unit of time"),
+    "--length-column": ("columns.length.column", str, "column of length"),
+    "--length-unit": ("columns.length.unit", str, "unit of length"),
+    "--length-is": ("columns.length.is", str, "'absolute' length (default) or 'change' from the reference length"),
+    "--length-of": ("columns.length.of", str, "length of the 'fibre' (default), a 'sarcomere' or a 'half_sarcomere'"),
     "--reference-length": (
-        ("reference_length",),
+        "reference_length",
         str,
         "the length that is L0, for example '42.8 mm', or 'first_isometric' (default)",
     ),
-    "--force-column": (("columns", "force", "column"), str, "column of measured force or stress"),
-    "--force-unit": (("columns", "force", "unit"), str, "unit of force or stress"),
-    "--f0": (("f0",), str, "the force or stress that is F0, for example '97 kPa'"),
-    "--calcium-column": (("columns", "calcium", "column"), str, "column of free calcium"),
-    "--calcium-unit": (("columns", "calcium", "unit"), str, "unit of calcium, or pCa"),
-    "--pca": (("pca",), float, "pCa of every file"),
-    "--amplitude": (("amplitude_l0",), float, "amplitude of the conditioning stretch, L0"),
-    "--recovery": (("recovery_s",), float, "time between shortening and test stretch, s"),
+    "--force-column": ("columns.force.column", str, "column of measured force or stress"),
+    "--force-unit": ("columns.force.unit", str, "unit of force or stress"),
+    "--f0": ("f0", str, "the force or stress that is F0, for example '97 kPa'"),
+    "--calcium-column": ("columns.calcium.column", str, "column of free calcium"),
+    "--calcium-unit": ("columns.calcium.unit", str, "unit of calcium, or pCa"),
+    "--pca": ("pca", float, "pCa of every file"),
+    "--amplitude": ("amplitude_l0", float, "amplitude of the conditioning stretch, L0"),
+    "--recovery": ("recovery_s", float, "time between shortening and test stretch, s"),
 }
 
 
@@ -77,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--format", choices=FORMATS, help="format of the files (default: what each looks like)")
     common.add_out(parser, "folder of the bags", "bags")
     for option, (key, kind, text) in _OPTIONS.items():
-        parser.add_argument(option, type=kind, dest=".".join(key), metavar=option.rpartition("-")[2].upper(), help=text)
+        parser.add_argument(option, type=kind, dest=key, metavar=option.rpartition("-")[2].upper(), help=text)
     parser.add_argument(
         "--isometric-scaling", action=argparse.BooleanOptionalAction,
         help="scale each trial's force to the isometric trial of its pCa (default: where the mapping has the table)",
@@ -114,7 +104,9 @@ def run(args: argparse.Namespace) -> int:
                 progress.write(f"{event.bag}: kept, made of the same file with the same mapping")
             else:
                 imported += 1
-                _tell(event, progress)
+                progress.write(_line(event.bag, event.trial))
+                for warning in event.trial.warnings:
+                    progress.write(f"  warning: {warning}")
     print(f"{imported} imported, {kept} kept, {failed} left out")
     return 0 if not failed else 1 if imported + kept else 2
 
@@ -128,20 +120,14 @@ def _settings(args: argparse.Namespace) -> ImportSettings:
     where = "options" if args.mapping is None else f"mapping {args.mapping}"
     overrides: dict[str, Any] = {}
     for key, _, _ in _OPTIONS.values():
-        value = getattr(args, ".".join(key))
+        value = getattr(args, key)
         if value is None:
             continue
-        branch = overrides
-        for part in key[:-1]:
+        branch, (*above, name) = overrides, key.split(".")
+        for part in above:
             branch = branch.setdefault(part, {})
-        branch[key[-1]] = value
+        branch[name] = value
     return ImportSettings(tree, where, args.format, args.isometric_scaling, overrides)
-
-
-def _tell(event: Imported, progress: Progress) -> None:
-    progress.write(_line(event.bag, event.trial))
-    for warning in event.trial.warnings:
-        progress.write(f"  warning: {warning}")
 
 
 def _line(bag: Path, trial: Trial) -> str:

@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     check_options(arguments.substeps, arguments.settle, arguments.live, bool(arguments.changes))
     fibre = common.fibre_of(arguments)
-    trials = common.study_of(arguments, fibre).trials
+    trials = common.trials_of(arguments, fibre)
     check_room(arguments.out, trials, arguments.overwrite)
     found = replay(
         trials, fibre, substeps=arguments.substeps, settle=arguments.settle, live=arguments.live, tell=common.warn

@@ -20,7 +20,7 @@ MECHANISMS: tuple[Name, ...] = (
 """Every mechanism: those of the blind benchmark in their usual order, then the others."""
 NAMES: tuple[Name, ...] = (*MECHANISMS, *MEASUREMENT)
 """All of them, in the order in which they are listed and fitted."""
-FAMILY: Mapping[Name, str] = MappingProxyType(
+FAMILY: Mapping[str, str] = MappingProxyType(
     {name: CATALOGUE[name].family if name in CATALOGUE else names.FAMILY[name] for name in NAMES}
 )
 """Family of every name."""

@@ -57,7 +57,6 @@ class Parameter:
         name, unit: of the parameter table, or of the artefact, with its group in brackets.
         value: estimate, averaged over the sets that have the component; over fibres: the centre of their distribution.
         interval: 95 %, without the probability that the component is absent.
-        at_bound: the estimate lies at a bound.
         spread: standard deviation over fibres, in its unit; None for one fibre.
     """
 
@@ -74,11 +73,8 @@ class OfFibre:
     """A component in one fibre of a study.
 
     Attributes:
-        fibre: name.
         inclusion_probability: from this fibre's recordings alone.
-        ablation_loss: of this fibre's.
         heldout_gain: None where nothing could be left out.
-        parameters: estimates in this fibre.
         replication: log Bayes factor for the component by this fibre's recordings, given those of all other fibres;
             within ±50; None for a study of one fibre.
     """
@@ -102,7 +98,6 @@ class Component:
 
     Attributes:
         name: of the mechanism or artefact, or of a family whose members are not separable.
-        kind: see `Kind`.
         family: of `names.FAMILY`.
         members: names in it, the likeliest first; a single name: itself.
         inclusion_probability: that it, or one of its members, is part of the truth.

@@ -24,7 +24,6 @@ class Condition(NamedTuple):
         pca: None where calcium changes.
         amplitude_l0, recovery_s: of the paper's protocol, as stated; None of others, recovery also without
             conditioning stretch.
-        phases: names of the phases, in order.
         travel_l0: largest change of length, L0.
     """
 

@@ -28,7 +28,6 @@ class FeatureTable:
     """What a file of features has on the fibres of a study.
 
     Attributes:
-        path: the file.
         data: all fibres of the file.
         features: of each fibre that the file has, in the order of the study; what a fit takes as data. Test stretches
             of a solution in which the fibre had run down are left out.

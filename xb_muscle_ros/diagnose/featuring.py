@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.feature_predictions import as_table, predicted, relative_srs_rmsd
 from xb_muscle_ros.diagnose.feature_tables import FeatureTable, seen
 from xb_muscle_ros.diagnose.result import Diagnosis, Feature, FeatureScore
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.searching import Searched
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.evaluate.srs_scores import READINGS, relative_at_conditions
+from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable, place
 from xb_muscle_ros.fit.features import Feature as Cell
-from xb_muscle_ros.scores.conditions import CONDITIONS
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.fit.features import simulated
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0, CONDITIONS, Condition, sets
+from xb_muscle_ros.scores.relative import Rmsd, rmsd
+from xb_muscle_ros.trials.trial import Array
 
 _KINDS = {
     "isometric_force": "isometric force",
@@ -31,9 +34,7 @@ def with_features(d: Diagnosis, study: Searched, table: FeatureTable, fitted: bo
     Relative SRS of a table that no fit has met is scored at the conditions of which no trace has the stretch.
 
     Args:
-        d: without them.
         study: fits of base and answer.
-        table: measured.
         fitted: whether the fits had to meet it; its test stretches of run-down fibres are predicted all the same.
     """
     rows: list[Feature] = []
@@ -80,7 +81,8 @@ def _is(cell: Cell, other: Cell) -> bool:
 
 def _of_set(study: Searched, names: Names, i: int, cells: tuple[Cell, ...]) -> Array:
     problem = study.explorer.systems[i].problem(names, study.explorer.fits[names][i].values)
-    return predicted(problem.fibre_at(problem.start), cells, problem.solution_shifts(problem.start))
+    muscle = Muscle(problem.fibre_at(problem.start))
+    return simulated(muscle, cells, problem.solution_shifts(problem.start))
 
 
 def _condition(cell: Cell) -> str:
@@ -109,14 +111,61 @@ def _scores(study: Searched, table: FeatureTable, values: dict[str, dict[str, Ar
         for label in ("before", "after")
     ]
     rows = []
-    for reading, before in both[0].items():
-        after = both[1][reading]
-        for key, value in before.rmsd.items():
-            other = after.rmsd[key]
-            if value is not None and other is not None:
-                rows.append(FeatureScore(reading, key, before.conditions[key], value, other))
+    for reading, of_base in both[0].items():
+        for key, before in of_base.items():
+            after = both[1][reading][key]
+            if before.value is not None and after.value is not None:
+                rows.append(FeatureScore(reading, key, before.n, before.value, after.value))
     return tuple(rows)
 
 
 def _same(condition: tuple[float, float], other: tuple[float, float]) -> bool:
     return abs(condition[0] - other[0]) <= 1e-6 and abs(condition[1] - other[1]) <= 1e-6 * max(other[1], 1.0)
+
+
+def as_table(
+    label: str, like: SrsTable, features: Mapping[str, Sequence[Cell]], values: Mapping[str, Array]
+) -> SrsTable:
+    """Predictions of several fibres on the axes of a table; NaN where a fibre has no feature.
+
+    Args:
+        like: whose axes are taken; every feature lies on them.
+        features: of each fibre.
+        values: what was predicted of them.
+    """
+    shape = (like.pca.size, like.recovery_s.size, like.amplitude_l0.size)
+    held = {}
+    for name, own in features.items():
+        test, conditioning, isometric = (np.full(shape, np.nan) for _ in range(3))
+        for f, value in zip(own, values[name].tolist(), strict=True):
+            i = place(like.pca, f.pca)
+            j, k = place(like.recovery_s, f.recovery_s), place(like.amplitude_l0, f.amplitude_l0)
+            if f.kind == "isometric_force":
+                isometric[i] = value
+            elif f.kind == "srs_conditioning":
+                conditioning[i, :, place(like.amplitude_l0, COMMON_AMPLITUDE_L0)] = value
+            else:
+                test[i, j, k] = value
+        held[name] = FibreSrs(test, conditioning, isometric)
+    return SrsTable(label, like.pca, like.recovery_s, like.amplitude_l0, held)
+
+
+def relative_srs_rmsd(
+    model: SrsTable, data: SrsTable, concealed: Sequence[Condition] | None = None
+) -> dict[str, dict[str, Rmsd]]:
+    """How far the mean relative SRS is from the measured, by the readings of docs/evaluate.md.
+
+    Args:
+        model: see `as_table`.
+        concealed: conditions (amplitude, recovery) that count; None for all 21.
+
+    Returns:
+        by reading (``text`` and ``released``) and set of conditions (``large``, ``small`` and ``all`` reductions).
+    """
+    counted = np.array([concealed is None or condition in concealed for condition in CONDITIONS])
+    found = {}
+    for name, reading in READINGS.items():
+        ours = relative_at_conditions(model, reading, data).centre
+        theirs = relative_at_conditions(data, reading, data).centre
+        found[name] = {key: rmsd(ours, theirs, mask & counted) for key, mask in sets(reading.large).items()}
+    return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -37,8 +37,6 @@ class FibreStudy:
 def read_fibres(
     bags: Sequence[str | Path],
     fibers: Sequence[str | Path | Fibre],
-    model: str | None = None,
-    method: str | None = None,
     known: Known | None = None,
     only: str | None = None,
 ) -> tuple[FibreStudy, ...]:
@@ -50,7 +48,6 @@ def read_fibres(
     Args:
         bags: bags or folders of bags, in the order of recording.
         fibers: fibre files, names of fibres that come with the package, or fibres.
-        model, method: of the fibre files; their own where None.
         known: what is known of L0 and F0 beside bags and fibre files.
         only: with one fibre: take trials of this fibre and no other.
 
@@ -63,22 +60,19 @@ def read_fibres(
     """
     if not bags:
         raise UserError("there are no bags to diagnose; give at least one")
-    if not fibers:
-        raise UserError("there is no fibre file to start from; give one with --fiber")
-    fibres = [each if isinstance(each, Fibre) else load_fibre(each, model, method) for each in fibers]
+    fibres = [each if isinstance(each, Fibre) else load_fibre(each) for each in fibers]
     _check_files(fibres)
     known = known or Known()
     if len(fibres) == 1:
         study = read_study(bags, fibres[0].name, known.of_file(fibres[0]), only)
-        return (_checked(FibreStudy(fibres[0], tuple(study.trials), (*study.notes, *_others(bags, fibres[0].name)))),)
+        notes = (*study.notes, *_others(bags, fibres[0].name))
+        return _checked([FibreStudy(fibres[0], tuple(study.trials), notes)])
     if only is not None:
         raise UserError(
             f"--trials-of {only} takes the trials of one fibre, but there are {len(fibres)} fibre files; with several, "
             "trials are found by the fibre's name; leave --trials-of out"
         )
-    studies = tuple(_checked(each) for each in _by_name(bags, fibres, known))
-    _check_conditions(studies)
-    return studies
+    return _checked(_by_name(bags, fibres, known))
 
 
 def given_twice(bags: Sequence[str | Path]) -> list[str]:
@@ -91,6 +85,8 @@ def given_twice(bags: Sequence[str | Path]) -> list[str]:
 
 def _check_files(fibres: Sequence[Fibre]) -> None:
     """Each fibre once, and one base model for all."""
+    if not fibres:
+        raise UserError("there is no fibre file to start from; give one with --fiber")
     names = [f.name for f in fibres]
     for name in names:
         if names.count(name) > 1:
@@ -139,22 +135,16 @@ def studies_of(trials: Sequence[Trial], fibres: Sequence[Fibre]) -> tuple[FibreS
     Raises:
         UserError: see `read_fibres`.
     """
-    if not fibres:
-        raise UserError("there is no fibre file to start from; give one with --fiber")
     _check_files(fibres)
     named = list(dict.fromkeys(trial.facts.fibre for trial in trials))
     if len(fibres) == 1:
-        return (_checked(FibreStudy(fibres[0], tuple(trials), tuple(_others_line(named, fibres[0].name)))),)
+        return _checked([FibreStudy(fibres[0], tuple(trials), tuple(_others_line(named, fibres[0].name)))])
     files = [fibre.name for fibre in fibres]
     if set(named) != set(files):
         raise UserError(
             f"trials are of fibres {_listed(named)}, fibre files of {_listed(files)}; give files and trials of the same"
         )
-    studies = tuple(
-        _checked(FibreStudy(fibre, tuple(t for t in trials if t.facts.fibre == fibre.name), ())) for fibre in fibres
-    )
-    _check_conditions(studies)
-    return studies
+    return _checked([FibreStudy(f, tuple(t for t in trials if t.facts.fibre == f.name), ()) for f in fibres])
 
 
 def _others(bags: Sequence[str | Path], fibre: str) -> list[str]:
@@ -178,7 +168,15 @@ def _fibres_of(bag: TrialBag) -> dict[str, str]:
     return {name: name for name in bag.fibres}
 
 
-def _checked(study: FibreStudy) -> FibreStudy:
+def _checked(studies: Sequence[FibreStudy]) -> tuple[FibreStudy, ...]:
+    """Studies that can be diagnosed together; see `_with_forces` and `_check_conditions`."""
+    checked = tuple(_with_forces(study) for study in studies)
+    if len(checked) > 1:
+        _check_conditions(checked)
+    return checked
+
+
+def _with_forces(study: FibreStudy) -> FibreStudy:
     """The study, its forces there, with a line on stiffness that cannot be measured.
 
     Raises:
@@ -195,7 +193,7 @@ def _checked(study: FibreStudy) -> FibreStudy:
                 f"trial {trial.facts.trial}: measured force is 0 N in all {trial.force_n.size} samples; check the "
                 "force channel, or leave the bag out"
             )
-    return FibreStudy(study.fibre, study.trials, (*study.notes, *_stiffness_lines(study.trials)))
+    return replace(study, notes=(*study.notes, *_stiffness_lines(study.trials)))
 
 
 def _stiffness_lines(trials: Sequence[Trial]) -> list[str]:

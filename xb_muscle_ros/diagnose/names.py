@@ -24,11 +24,6 @@ class Name(str):
         """The one name of a text."""
         return cls._made.setdefault(text, super().__new__(cls, text))
 
-    @property
-    def value(self) -> str:
-        """The plain text."""
-        return str.__str__(self)
-
     VISCOUS_DRAG: ClassVar[Name]
     PASSIVE_VISCOELASTICITY: ClassVar[Name]
     WEAKLY_BOUND_HEADS: ClassVar[Name]
@@ -86,7 +81,7 @@ _FAMILIES: Mapping[str, tuple[Name, ...]] = {
     "length_scale": (Name.LENGTH_GAIN,),
     "timing": (Name.TIME_SHIFT, Name.TRANSDUCER_LAG),
 }
-FAMILY: Mapping[Name, str] = MappingProxyType(
+FAMILY: Mapping[str, str] = MappingProxyType(
     {name: family for family, members in _FAMILIES.items() for name in members}
 )
 """Family of every name."""

@@ -1,19 +1,26 @@
-"""The next experiment: from a menu of protocols the one on which two explanations differ most."""
+"""The next experiment: from a menu of protocols the one that separates what is least sure."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from xb_muscle_ros.diagnose.component import Component, Kind
+from xb_muscle_ros.diagnose.names import MEASUREMENT
+from xb_muscle_ros.diagnose.search.system import Names
+from xb_muscle_ros.diagnose.searching import Searched
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.simulation.offline import simulate_trial
 from xb_muscle_ros.trials.trial import Array, Phase, Trial, TrialFacts
 
+# Surer than this there is nothing to separate.
+_SURE = 0.98
 # Menu: speed and amplitude of a ramp, hold after it, length the fibre starts from.
 _SPEEDS_L0_PER_S = (0.05, 0.5, 2.0)
 _AMPLITUDES_L0 = (0.04, -0.04)
@@ -23,25 +30,14 @@ _RATE_HZ = 1000.0
 
 
 class Protocol(NamedTuple):
-    """One entry of the menu.
-
-    Attributes:
-        words: what is done.
-        trial: the inputs, no force.
-    """
+    """One entry of the menu: what is done in words, and its inputs as a trial without force."""
 
     words: str
     trial: Trial
 
 
 class Proposal(NamedTuple):
-    """What to do next.
-
-    Attributes:
-        protocol: what to record.
-        separates: names of the components that it separates.
-        difference_f0: root-mean-square by which they differ there.
-    """
+    """What to record next, the components that it separates, and the root-mean-square by which they differ there."""
 
     protocol: Protocol
     separates: tuple[str, ...]
@@ -50,13 +46,8 @@ class Proposal(NamedTuple):
 
 def menu(fibre: str, pcas: Sequence[float]) -> list[Protocol]:
     """Ramps and holds at some pCa, fast and slow, up and down, from rest length and from a longer one."""
-    found = []
-    for pca in pcas:
-        for start in _LENGTHS_L0:
-            for amplitude in _AMPLITUDES_L0:
-                for speed in _SPEEDS_L0_PER_S:
-                    found.append(_ramp(fibre, pca, start, amplitude, speed))
-    return found
+    grid = itertools.product(pcas, _LENGTHS_L0, _AMPLITUDES_L0, _SPEEDS_L0_PER_S)
+    return [_ramp(fibre, *row) for row in grid]
 
 
 def _ramp(fibre: str, pca: float, start_l0: float, amplitude_l0: float, speed: float) -> Protocol:
@@ -106,6 +97,40 @@ def propose(one: Fibre, other: Fibre, separates: Sequence[str], pcas: Sequence[f
         if best is None or apart > best.difference_f0:
             best = Proposal(protocol, tuple(separates), apart)
     return best
+
+
+def plan(study: Searched, found: Sequence[Component]) -> Proposal | None:
+    """The protocol on which the two most probable sets differ most that do not agree on the least sure mechanism."""
+    sets = {s: study.explorer.evidence(s) for s in study.explorer.fits}
+    for names, separates in _pairs(sets, found):
+        one, other = (study.fibre_with(s, 0) for s in names)
+        pcas = sorted({t.facts.pca for t in study.studies[0].trials if t.facts.pca is not None})
+        chosen = sorted({pcas[0], pcas[len(pcas) // 2], pcas[-1]}) if pcas else [6.2]
+        proposal = propose(one, other, separates, chosen)
+        if proposal is not None:
+            return proposal
+    return None
+
+
+def _pairs(sets: dict[Names, float], found: Sequence[Component]) -> list[tuple[tuple[Names, Names], tuple[str, ...]]]:
+    """Pairs of sets to tell apart, the least sure component first."""
+    unsure = sorted(
+        (c for c in found if c.kind is Kind.MECHANISM and c.inclusion_probability > 1.0 - _SURE),
+        key=lambda c: abs(c.inclusion_probability - 0.5),
+    )
+    pairs = []
+    for c in unsure[:3]:
+        members = c.members[:2]
+        first, *others = ([s for s in sets if m in s] for m in members)
+        second = others[0] if others else [s for s in sets if members[0] not in s]
+        if not first or not second:
+            continue
+        best = max(first, key=lambda s: sets[s]), max(second, key=lambda s: sets[s])
+        one, other = ([n for n in names if n not in MEASUREMENT] for names in best)
+        if set(one) != set(other):
+            instead = (n for n in other if n not in one)
+            pairs.append((best, (*members, *instead)[:2]))
+    return pairs
 
 
 def scaled(trial: Trial, reference_length_m: float, f0_n: float) -> Trial:

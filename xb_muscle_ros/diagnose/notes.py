@@ -10,7 +10,7 @@ from xb_muscle_ros.diagnose.effort import Effort
 from xb_muscle_ros.diagnose.noise.residuals import Recordings
 from xb_muscle_ros.diagnose.result import Diagnosis
 from xb_muscle_ros.diagnose.search.descent import Fit
-from xb_muscle_ros.diagnose.search.system import SATURATING, Names, System, label
+from xb_muscle_ros.diagnose.search.system import SATURATING, Names, System, at_bound, label
 from xb_muscle_ros.diagnose.words import human, percent
 from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.fit.data import FitTrial
@@ -21,20 +21,18 @@ from xb_muscle_ros.trials.trial import Trial
 
 # A nuisance parameter this many prior SDs large is at the edge of what is ordinary.
 _EDGE = 2.0
-# A value this near a bound, as a share of the way between bounds, ended there.
-_AT_BOUND = 1e-3
 # Length that moves less than this does not move, L0.
 _MOVES = 1e-6
 _MOST_NAMES = 6
 
 
-def of_effort(effort: Effort, usual: Effort, trials: Mapping[str, int]) -> list[str]:
+def of_effort(effort: Effort, trials: Mapping[str, int]) -> list[str]:
     """Lines on how hard was looked, and what could not be held out, from the number of trials of each fibre."""
-    lines = []
+    lines, usual = [], Effort()
     if effort != usual:
         lines.append(
-            f"this is a quick diagnosis: at most {effort.search.steps} names in a set (else {usual.search.steps}), "
-            f"{effort.search.candidates} candidates fitted at each step ({usual.search.candidates}), {effort.folds} "
+            f"this is a quick diagnosis: at most {effort.steps} names in a set (else {usual.steps}), "
+            f"{effort.candidates} candidates fitted at each step ({usual.candidates}), {effort.folds} "
             f"groups left out in turn ({usual.folds}), {effort.draws} repeats of the bootstrap ({usual.draws})"
         )
     few = {name: count for name, count in trials.items() if count < 3}
@@ -58,15 +56,7 @@ def of_benchmark(d: Diagnosis) -> list[str]:
 
 
 def of_fibre(given: Fibre, trials: Sequence[Trial], recordings: Recordings, system: System, shown: Fit) -> list[str]:
-    """Lines on one fibre: its inputs, its noise, and how its fit ended.
-
-    Args:
-        given: fibre as it was given.
-        trials: that were diagnosed.
-        recordings: with their noise.
-        system: thinned trials.
-        shown: the fit that stands for the answer.
-    """
+    """Lines on one fibre: its inputs, its noise, and how the fit that stands for the answer (`shown`) ended."""
     coordinates = system.problem(shown.names, shown.values).coordinates
     return [
         *_inputs(given, trials),
@@ -150,11 +140,7 @@ def _closure(system: System) -> Iterator[str]:
 
 
 def _bounds(coordinates: Sequence[Coordinate]) -> Iterator[str]:
-    at = []
-    for c in coordinates:
-        low, high, z = c.inward(c.lower), c.inward(c.upper), c.inward(c.start)
-        if not _AT_BOUND * (high - low) < z - low < (1.0 - _AT_BOUND) * (high - low):
-            at.append(f"{c.label} at {c.start:.3g}")
+    at = [f"{c.label} at {c.start:.3g}" for c in coordinates if at_bound(c, c.inward(c.start))]
     if at:
         yield f"coordinates that ended at a bound: {', '.join(at)}"
 

@@ -35,7 +35,6 @@ class Files:
 
     Attributes:
         augmented: fibres with the answer's mechanisms, by file name.
-        traces: of every trial.
         protocol: the next experiment in the first fibre's units; None where there is none.
     """
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.result import OfTrial
 from xb_muscle_ros.diagnose.words import joined, percent
@@ -14,8 +13,7 @@ from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.simulation.offline import outputs
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Beyond these a force is absurd, F0: passive, active, and a push.
 _PASSIVE_F0, _ACTIVE_F0, _PUSH_F0 = 0.5, 3.0, -0.05
@@ -27,12 +25,9 @@ _WORSE_F0 = 0.01
 
 
 def warnings(fibre: Fibre, base: Fibre, trials: Sequence[FitTrial]) -> list[str]:
-    """Lines on absurd forces: passive at the longest length of the study, active at twice its speeds.
+    """Lines on absurd forces of an answer, of which the fitted base has less.
 
-    Args:
-        fibre: with the answer's mechanisms.
-        base: fitted without.
-        trials: of the study.
+    They are passive at the longest length of the study, and active at twice its speeds.
     """
     found = []
     longest = max(trials, key=lambda t: float(np.max(t.length_l0)))

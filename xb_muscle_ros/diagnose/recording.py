@@ -6,33 +6,20 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from xb_muscle_ros.diagnose import notes, outside
+from xb_muscle_ros.diagnose import notes, outside, rows
 from xb_muscle_ros.diagnose.answers import MECHANISMS
 from xb_muscle_ros.diagnose.component import Component
 from xb_muscle_ros.diagnose.effort import Effort
 from xb_muscle_ros.diagnose.inference.answer import answer_of, components, verdict_of
-from xb_muscle_ros.diagnose.inference.shares import explained
 from xb_muscle_ros.diagnose.names import MEASUREMENT
-from xb_muscle_ros.diagnose.next_experiment import scaled
+from xb_muscle_ros.diagnose.next_experiment import plan, scaled
 from xb_muscle_ros.diagnose.noise.closure import by_distribution
 from xb_muscle_ros.diagnose.noise.residuals import Around
-from xb_muscle_ros.diagnose.noise.significance import ALPHA, FLOOR_F0
+from xb_muscle_ros.diagnose.noise.significance import FLOOR_F0
 from xb_muscle_ros.diagnose.outputs import NEXT, Files, augmented_name
-from xb_muscle_ros.diagnose.planning import plan
-from xb_muscle_ros.diagnose.residual import AnswerResidual, ResidualLaw, ResidualMap
+from xb_muscle_ros.diagnose.residual import AnswerResidual, ResidualLaw
 from xb_muscle_ros.diagnose.result import FORMAT, Diagnosis, NextExperiment, SetOfMechanisms, Verdict
-from xb_muscle_ros.diagnose.rows import (
-    benchmark,
-    law_row,
-    nuisance_parameters,
-    of_fibres,
-    of_trials,
-    places,
-    rmsd,
-    scores,
-)
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.search.whole import beside, only
 from xb_muscle_ros.diagnose.searching import Searched
@@ -40,8 +27,6 @@ from xb_muscle_ros.diagnose.tracing import directed, traced
 from xb_muscle_ros.diagnose.words import percent
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
-
-Array = npt.NDArray[np.float64]
 
 # More noise than this hides what is looked for, F0; a base whose residual is more than this share of the force's
 # standard deviation does not describe the recordings.
@@ -61,11 +46,11 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
     after = [study.around(chosen, i) if chosen else before[i] for i in range(count)]
     of_answer = [study.recordings[i].significance(after[i]) if chosen else study.base[i] for i in range(count)]
     traces = traced(study, chosen, before, after)
-    found = _by_component([directed(study, c, traces) for c in components(judged)])
-    detected = any(s.detected(ALPHA) for s in study.base)
+    found = _by_component([directed(c, traces) for c in components(judged)])
+    detected = any(s.detected() for s in study.base)
     described = _described(study, before, after)
     fine = all(
-        rmsd(t.start_f0 - t.measured_f0) <= max(_AS_GOOD * rmsd(t.before_f0 - t.measured_f0), FLOOR_F0)
+        rows.rmsd(t.start_f0 - t.measured_f0) <= max(_AS_GOOD * rows.rmsd(t.before_f0 - t.measured_f0), FLOOR_F0)
         for t in (each.forces for each in traces)
     )
     verdict = verdict_of(found, described, detected, fine)
@@ -74,7 +59,7 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
     augmented = _augmented(study, chosen) if answer else {}
     proposal = plan(study, found) if detected or answer else None
     base_law, answer_law = (_law(study, arounds, detected) for arounds in (before, after))
-    trials = of_trials(study, chosen, traces)
+    trials = rows.of_trials(study, chosen, traces)
     warned = [*(w for s in study.studies for t in s.trials for w in t.warnings), *study.lines]
     notes_of_all = _notes(study, chosen, effort)
     if augmented:
@@ -94,27 +79,27 @@ def recorded(study: Searched, effort: Effort, seed: int) -> tuple[Diagnosis, Fil
         verdict=verdict,
         answer=answer,
         components=found,
-        explained_fraction=explained(study.explorer, chosen, judged.noise_f0) if chosen else 0.0,
-        mismatch=places(names, study.base),
+        explained_fraction=judged.explained(chosen) if chosen else 0.0,
+        mismatch=rows.places(names, study.base),
         p_value=min(1.0, count * min(s.overall_p for s in study.base)),
         described=described,
         residual=AnswerResidual(
-            rmsd_f0=rmsd(np.concatenate([a.residual_f0 for a in after])),
+            rmsd_f0=rows.rmsd(np.concatenate([a.residual_f0 for a in after])),
             noise_f0=float(np.median(judged.noise_f0)),
-            places=places(names, of_answer),
+            places=rows.places(names, of_answer),
             law=answer_law,
         ),
         base_law=base_law,
-        before=scores(study, ()),
-        after=scores(study, chosen),
+        before=rows.scores(study, ()),
+        after=rows.scores(study, chosen),
         heldout_gain=judged.heldout.gain(chosen, ()) if chosen else None,
-        benchmark_rmsd_f0=benchmark(study, before),
+        benchmark_rmsd_f0=rows.benchmark(study, before),
         sets=_sets(study),
-        by_fibre=of_fibres(study, chosen, found),
+        by_fibre=rows.of_fibres(study, chosen, found),
         trials=trials,
-        nuisance_parameters=nuisance_parameters(study, chosen),
-        map_before={n: ResidualMap.of(s.map(ALPHA)) for n, s in zip(names, study.base, strict=True)},
-        map_after={n: ResidualMap.of(s.map(ALPHA)) for n, s in zip(names, of_answer, strict=True)},
+        nuisance_parameters=rows.nuisance_parameters(study, chosen),
+        map_before={n: s.map() for n, s in zip(names, study.base, strict=True)},
+        map_after={n: s.map() for n, s in zip(names, of_answer, strict=True)},
         next_experiment=None
         if proposal is None
         else NextExperiment(NEXT, proposal.protocol.words, proposal.separates, proposal.difference_f0),
@@ -155,10 +140,10 @@ def _without_errors(study: Searched, chosen: Names, i: int) -> str:
         forces = problem.predicted(z)
     except UserError:
         return f"{name}: the augmented file has no solution without the measurement artefacts of the fit"
-    residual = [f - t.measured_f0 for f, t in zip(forces, recorded.trials, strict=True)]
-    with_errors = rmsd(study.around(chosen, i).residual_f0)
+    left = rows.rmsd(np.concatenate([f - t.measured_f0 for f, t in zip(forces, recorded.trials, strict=True)]))
+    with_errors = rows.rmsd(study.around(chosen, i).residual_f0)
     return (
-        f"{name}: a replay of the augmented file leaves {percent(rmsd(np.concatenate(residual)))} % F0, because files "
+        f"{name}: a replay of the augmented file leaves {percent(left)} % F0, because files "
         "have no measurement artefacts (pCa shifts, gain of length, offsets); with those of the fit it is "
         f"{percent(with_errors)} % F0"
     )
@@ -168,7 +153,7 @@ def _described(study: Searched, before: Sequence[Around], after: Sequence[Around
     """Whether there is anything to build on: the model describes the recordings, and noise does not hide all."""
     for i, recorded in enumerate(study.recorded):
         spread = float(np.std(recorded.measured))
-        residual = min(rmsd(before[i].residual_f0), rmsd(after[i].residual_f0))
+        residual = min(rows.rmsd(before[i].residual_f0), rows.rmsd(after[i].residual_f0))
         if study.judged.noise_f0[i] > _NOISY_F0 or residual > _UNDESCRIBED * spread:
             return False
     return True
@@ -178,12 +163,9 @@ def _law(study: Searched, arounds: Sequence[Around], detected: bool) -> Residual
     """The law of the fibre whose residual follows one best; None where none does."""
     if not detected:
         return None
-    found = [
-        law_row(study.fibres[i].name, law)
-        for i, around in enumerate(arounds)
-        if (law := study.recordings[i].law(around)) is not None and law.explained >= _LAW
-    ]
-    return max(found, key=lambda row: row.explained_fraction, default=None)
+    laws = [recordings.law(around) for recordings, around in zip(study.recordings, arounds, strict=True)]
+    found = [law for law in laws if law is not None and law.explained_fraction >= _LAW]
+    return max(found, key=lambda law: law.explained_fraction, default=None)
 
 
 def _sets(study: Searched) -> tuple[SetOfMechanisms, ...]:
@@ -191,7 +173,7 @@ def _sets(study: Searched) -> tuple[SetOfMechanisms, ...]:
     chances = averages.probability
     return tuple(
         SetOfMechanisms(
-            names=tuple(n.value for n in averages.sets[k]),
+            names=averages.sets[k],
             probability=float(chances[k]),
             log_evidence=float(averages.log_evidence[k]),
             rmsd_f0=float(np.sqrt(averages.mean_square_f0[k])),
@@ -211,7 +193,7 @@ def _augmented(study: Searched, chosen: Names) -> dict[str, Fibre]:
     for i, given in enumerate(study.fibres):
         fibre = only(study.fibre_with(chosen, i), given, names)
         fibre = by_distribution(fibre) if study.recorded[i].closure_f0 else fibre
-        words = " and ".join(n.value for n in names)
+        words = " and ".join(names)
         trials = len(study.recorded[i].trials)
         source = f"fitted by this package to {trials} trials of fibre {fibre.name}, with {words} (diagnosed)"
         made[augmented_name(given.name, len(study.fibres) > 1)] = replace(fibre, source=source)
@@ -227,7 +209,7 @@ def _missing(study: Searched, verdict: Verdict, found: Sequence[Component], afte
         name, noise = study.fibres[i].name, study.judged.noise_f0[i]
         if noise > _NOISY_F0:
             lines.append(f"force with less noise: {100 * noise:.1f} % F0 in fibre {name} hides what is looked for")
-        if rmsd(after[i].residual_f0) > _UNDESCRIBED * float(np.std(recorded.measured)):
+        if rows.rmsd(after[i].residual_f0) > _UNDESCRIBED * float(np.std(recorded.measured)):
             lines.append(
                 "recordings that the model describes at all: after the fit the residual of fibre "
                 f"{name} is half of its force's variation; check that channels, units, calcium and fibre fit"
@@ -240,7 +222,7 @@ def _missing(study: Searched, verdict: Verdict, found: Sequence[Component], afte
 
 
 def _notes(study: Searched, chosen: Names, effort: Effort) -> list[str]:
-    lines = list(notes.of_effort(effort, Effort(), {s.fibre.name: len(s.trials) for s in study.studies}))
+    lines = list(notes.of_effort(effort, {s.fibre.name: len(s.trials) for s in study.studies}))
     several = len(study.fibres) > 1
     for i, each in enumerate(study.studies):
         own = [
@@ -253,5 +235,5 @@ def _notes(study: Searched, chosen: Names, effort: Effort) -> list[str]:
         ]
         lines += [f"fibre {study.fibres[i].name}: {line}" if several else line for line in own]
     allowed = set.intersection(*(set(beside(f)) for f in study.fibres))
-    left_out = [n.value for n in MECHANISMS if n not in allowed]
+    left_out = [n for n in MECHANISMS if n not in allowed]
     return [*lines, *notes.of_search(study.explorer.unsolved, left_out)]

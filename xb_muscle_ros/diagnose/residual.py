@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any
 
 
 @dataclass(frozen=True)
@@ -35,12 +34,13 @@ class ResidualLaw:
     """A Prony series in the length change that describes a residual and does not explain it.
 
     Attributes:
-        fibre: whose.
         time_constant_s: the dominant one.
         scales_with: ``constant``, ``activation``, ``calcium`` or ``force``.
-        gain_f0_per_l0: force per length of a sudden change.
-        explained_fraction: of the residual's mean square in held-out trials.
-        tau_s, weight_f0: of all exponentials.
+        gain_f0_per_l0: of all exponentials together: force per length of a sudden change where what it scales with is
+            1; below 0 where the model lacks force against the sign of velocity.
+        explained_fraction: of the residual's mean square in trials left out; of one trial, of itself.
+        tau_s: time constants that were offered, s.
+        weight_f0: root-mean-square force of each in the recordings before any refit, F0, with the sign of the gain.
         other_scalings: explained fraction for what else it could scale with.
     """
 
@@ -88,12 +88,6 @@ class ResidualMap:
     mean_f0: tuple[tuple[float | None, ...], ...] = ()
     p_value: tuple[tuple[float | None, ...], ...] = ()
     counts: tuple[tuple[bool, ...], ...] = ()
-
-    @classmethod
-    def of(cls, rows: Mapping[str, Any]) -> ResidualMap:
-        """From the plain rows of `Significance.map`."""
-        frozen: dict[str, Any] = {k: tuple(tuple(v) if isinstance(v, list) else v for v in rows[k]) for k in rows}
-        return cls(**frozen)
 
     def cells(self) -> Iterator[tuple[str, str, float, float | None, bool]]:
         """Trial, phase, root mean square, mean and whether it counts, of every cell that there is."""

@@ -12,7 +12,7 @@ from xb_muscle_ros.diagnose.component import NAMED, Component, HeldOutGain
 from xb_muscle_ros.diagnose.residual import AnswerResidual, Place, ResidualLaw, ResidualMap
 
 FORMAT = 3
-"""Version of `diagnosis.json`; `report.older_formats` has the keys of former ones."""
+"""Version of `diagnosis.json`; `report.codec` has the keys of former ones."""
 
 
 class Verdict(str, enum.Enum):
@@ -71,11 +71,9 @@ class NuisanceParameter:
     """An ordinary measurement artefact as estimated: a nuisance parameter of every model.
 
     Attributes:
-        fibre: whose.
         name, group: of the artefact; group: the solution or trial, empty for the whole study.
         unit: of value, sd and prior_sd.
         value: estimate with the answer's model.
-        sd: standard error.
         prior_sd: what is ordinary.
         before: estimate with the base; None where the base does not have it.
     """
@@ -95,7 +93,6 @@ class OfTrial:
     """One trial before and after.
 
     Attributes:
-        fibre, trial, pca: which.
         phases: name, start and end in s.
         noise_sd_f0, noise_source, noise_samples: of its force; `noise_source` as in `scores.noise.model.Source`.
         before_rmsd_f0, after_rmsd_f0: base and answer, fitted to all trials.
@@ -121,9 +118,6 @@ class OfStudyFibre:
     """One fibre of the study as a whole.
 
     Attributes:
-        fibre: name.
-        model: base set.
-        trials: how many.
         answer: names with probability of `NAMED` and more from this fibre alone.
         before, after: base, and the study's answer fitted to this fibre.
         left_out_rmsd_f0: this fibre predicted with effects as the other fibres have them, base and answer, F0; None
@@ -150,7 +144,6 @@ class Feature:
     """A tabulated feature, measured and predicted.
 
     Attributes:
-        fibre: whose.
         name: ``isometric force`` (F0) or ``SRS`` (F0/L0).
         condition: in words: pCa, amplitude, recovery.
         measured, before, after: value, by the base and by the answer.
@@ -175,7 +168,6 @@ class FeatureScore:
     Attributes:
         reading: of docs/evaluate.md: ``text`` or ``released``.
         conditions: set of conditions: ``large``, ``small`` or ``all`` reductions of SRS.
-        count: how many conditions were compared.
         before, after: by base and answer.
     """
 
@@ -208,11 +200,9 @@ class Diagnosis:
     """All that a diagnosis found.
 
     Attributes:
-        format_version: see `FORMAT`.
         fibres: in the order given.
         model, method: of the base.
         quick, seed, seconds: how it was made.
-        verdict: see `Verdict`.
         answer: mechanisms with an inclusion probability of `NAMED` or more, best first.
         components: all candidates, the most probable first.
         explained_fraction: of the mismatch by the answer.

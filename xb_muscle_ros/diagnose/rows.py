@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.component import NAMED, Component, Kind
 from xb_muscle_ros.diagnose.inference.left_out import left_out
-from xb_muscle_ros.diagnose.noise.law import Law
 from xb_muscle_ros.diagnose.noise.residuals import Around
-from xb_muscle_ros.diagnose.noise.significance import ALPHA, Significance
-from xb_muscle_ros.diagnose.residual import Place, ResidualLaw
+from xb_muscle_ros.diagnose.noise.significance import Significance
+from xb_muscle_ros.diagnose.residual import Place
 from xb_muscle_ros.diagnose.result import NuisanceParameter, OfStudyFibre, OfTrial, Scores
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.searching import Searched
 from xb_muscle_ros.diagnose.tracing import Traced
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 from xb_muscle_ros.models.parameters import PARAMETERS
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 _MOST_PLACES = 12
 
@@ -31,45 +28,18 @@ def rmsd(values: Array) -> float:
 
 
 def places(names: Sequence[str], found: Sequence[Significance]) -> tuple[Place, ...]:
-    """Where residuals stand out; of one fibre the phase with the largest residual first, of several the largest place.
-
-    Where only the whole does, its largest cell.
-    """
-    rows = []
-    for name, s in zip(names, found, strict=True):
-        pcas = {r.trial: r.pca for r in s.residuals}
-        own = s.mismatch(ALPHA) or ([s.largest()] if s.detected(ALPHA) else [])
-        rows += [
-            Place(
-                fibre=name, trial=row["trial"], phase=row["phase"], start_s=row["start_s"], end_s=row["end_s"],
-                size_f0=row["size_f0"], mean_f0=row["mean_f0"], p_value=row["p_value"], pca=pcas[row["trial"]],
-            )
-            for row in own
-        ]  # fmt: skip
+    """Where residuals stand out: of one fibre as in `Significance.places`, of several the largest place first."""
+    rows = [place for name, s in zip(names, found, strict=True) for place in s.places(name)]
     if len(names) > 1:
-        rows.sort(key=lambda p: -p.size_f0)
-    return tuple(rows[:_MOST_PLACES] if len(names) > 1 else rows)
-
-
-def law_row(fibre: str, law: Law) -> ResidualLaw:
-    """A law as a row."""
-    return ResidualLaw(
-        fibre=fibre,
-        time_constant_s=law.time_constant_s,
-        scales_with=law.scales_with,
-        gain_f0_per_l0=law.stiffness_f0_per_l0,
-        explained_fraction=law.explained,
-        tau_s=tuple(law.tau_s.tolist()),
-        weight_f0=tuple(law.weight_f0.tolist()),
-        other_scalings=dict(law.others),
-    )
+        rows = sorted(rows, key=lambda p: -p.size_f0)[:_MOST_PLACES]
+    return tuple(rows)
 
 
 def scores(study: Searched, names: Names, i: int | None = None) -> Scores:
     """How far a set is from the recordings, of all fibres or of one."""
     chosen = range(len(study.fibres)) if i is None else [i]
     squares = np.concatenate([study.around(names, k).residual_f0 for k in chosen])
-    return Scores(tuple(n.value for n in names), rmsd(squares), study.judged.heldout.rmsd(names, i))
+    return Scores(names, rmsd(squares), study.judged.heldout.rmsd(names, i))
 
 
 def benchmark(study: Searched, before: Sequence[Around]) -> float | None:
@@ -78,7 +48,7 @@ def benchmark(study: Searched, before: Sequence[Around]) -> float | None:
     for recordings, around, folds in zip(study.recordings, before, study.judged.heldout.folds, strict=True):
         found = recordings.benchmark(around, folds) if folds else None
         if found is not None:
-            squares, samples = squares + found[1], samples + found[2]
+            squares, samples = squares + found[0], samples + found[1]
     return float(np.sqrt(squares / samples)) if samples else None
 
 
@@ -88,7 +58,8 @@ def of_trials(study: Searched, chosen: Names, traces: Sequence[Traced]) -> tuple
     for t in traces:
         name = t.residual.trial
         noise = study.recordings[t.fibre].noise.of([name]).trials[0]
-        held = [study.judged.heldout.rmsd_by_trial(s).get((t.fibre, name)) for s in ((), chosen)]
+        held = (study.judged.heldout.rmsd_by_trial(s).get((t.fibre, name), np.inf) for s in ((), chosen))
+        held_before, held_after = (value if np.isfinite(value) else None for value in held)
         rows.append(
             OfTrial(
                 fibre=study.fibres[t.fibre].name,
@@ -100,8 +71,8 @@ def of_trials(study: Searched, chosen: Names, traces: Sequence[Traced]) -> tuple
                 noise_samples=noise.samples,
                 before_rmsd_f0=rmsd(t.forces.before_f0 - t.forces.measured_f0),
                 after_rmsd_f0=rmsd(t.forces.after_f0 - t.forces.measured_f0),
-                heldout_before_f0=held[0] if held[0] is not None and np.isfinite(held[0]) else None,
-                heldout_after_f0=held[1] if held[1] is not None and np.isfinite(held[1]) else None,
+                heldout_before_f0=held_before,
+                heldout_after_f0=held_after,
             )
         )
     return tuple(rows)

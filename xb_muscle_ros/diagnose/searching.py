@@ -14,7 +14,7 @@ from xb_muscle_ros.diagnose.inference.heldout import HeldOut
 from xb_muscle_ros.diagnose.intake import FibreStudy
 from xb_muscle_ros.diagnose.noise.closure import closure_error
 from xb_muscle_ros.diagnose.noise.residuals import Around, Recordings
-from xb_muscle_ros.diagnose.noise.significance import ALPHA, FLOOR_F0, Significance
+from xb_muscle_ros.diagnose.noise.significance import FLOOR_F0, Significance
 from xb_muscle_ros.diagnose.search.compiling import compile_first
 from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import Names, System
@@ -32,12 +32,9 @@ class BaseFitted:
     """A study before its search: the base is fitted, and the Gaussian form's own error taken out.
 
     Attributes:
-        studies: as read.
         fibres: as the search starts from them: smoothing off, constants of the trials.
         recorded: all samples of each fibre.
         recordings: trials of each fibre with their noise.
-        explorer: all fits.
-        lines: warnings on the way.
     """
 
     studies: tuple[FibreStudy, ...]
@@ -64,12 +61,7 @@ class BaseFitted:
 
 @dataclass(frozen=True)
 class Searched(BaseFitted):
-    """A study, searched.
-
-    Attributes:
-        judged: averages and held-out predictions.
-        base: significance of the base's residual in each fibre.
-    """
+    """A study, searched, with the significance of the base's residual in each fibre."""
 
     judged: Judged
     base: tuple[Significance, ...]
@@ -83,13 +75,9 @@ def fit_base(
     features: Mapping[str, tuple[Feature, ...]] = MappingProxyType({}),
     error_sds: Mapping[str, float] = MappingProxyType({}),
 ) -> BaseFitted:
-    """Fit the base of a study.
+    """Fit the base of a study; arguments as of `run.diagnose`.
 
     Args:
-        studies: fibres with their trials.
-        effort: how hard to look.
-        seed: of the bootstrap.
-        options: where work is done.
         features: to be met beside the traces, by fibre.
         error_sds: of ordinary measurement errors, in place of those of `measurement.artefacts.ARTEFACTS`.
 
@@ -117,20 +105,16 @@ def fit_base(
     # A fit takes a fraction of a second, less than to start the processes that would share the work.
     if options.scheduler is None and options.processes is None:
         options = replace(options, processes=0)
-    explorer = Explorer(systems, effort.search, options)
+    explorer = Explorer(systems, effort, options)
     explorer.base()
     made = BaseFitted(tuple(studies), tuple(fibres), tuple(recorded), tuple(recordings), explorer, tuple(lines))
-    if any(found.detected(ALPHA) for found in made.significance()):
+    if any(found.detected() for found in made.significance()):
         made = replace(made, recorded=tuple(_closed(explorer, recorded)))
     return made
 
 
-def search(study: BaseFitted, folds: int) -> Searched:
-    """Search a study.
-
-    Args:
-        study: its base is fitted.
-        folds: groups of trials left out in turn, at most.
+def search(study: BaseFitted) -> Searched:
+    """Search a study whose base is fitted.
 
     Raises:
         UserError: no solution with all that has evidence, or a force that cannot be looked at.
@@ -141,7 +125,7 @@ def search(study: BaseFitted, folds: int) -> Searched:
         study = replace(study, recorded=tuple(replace(s, closure_f0={}) for s in study.recorded))
         explorer.anew([replace(s, closure_f0={}) for s in explorer.systems])
         explorer.explore()
-    heldout = HeldOut(explorer, study.recorded, folds, explorer.options)
+    heldout = HeldOut(explorer, study.recorded)
     judged = Judged.of(explorer, heldout, [r.usual_noise_f0() for r in study.recordings])
     _predict(judged)
     return Searched(**study.__dict__, judged=judged, base=study.significance())

@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.component import Component
-from xb_muscle_ros.diagnose.inference.direction import direction
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.noise.cells import Residual
 from xb_muscle_ros.diagnose.noise.residuals import Around
@@ -17,11 +15,14 @@ from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.search.system import Names
 from xb_muscle_ros.diagnose.search.whole import FRAMES
 from xb_muscle_ros.diagnose.searching import Searched
+from xb_muscle_ros.diagnose.words import percent, phase_words
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.models.catalogue import CATALOGUE
+from xb_muscle_ros.trials.trial import Array
 
-Array = npt.NDArray[np.float64]
+# A smaller effect on the force is not reported, F0.
+_LEAST_F0 = 5e-4
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def traced(study: Searched, chosen: Names, before: Sequence[Around], after: Sequ
                 after_f0=fits[1][k],
                 heldout_before_f0=held[0],
                 heldout_after_f0=held[1],
-                without_f0={n.value: p[k] for n, p in parts.items() if p is not None},
+                without_f0={n: p[k] for n, p in parts.items() if p is not None},
             )
             found.append(Traced(i, residuals[k], forces))
     return found
@@ -96,7 +97,7 @@ def _without(study: Searched, chosen: Names, name: Name, i: int) -> list[Array] 
         z = problem.start.copy()
         if name in MEASUREMENT:
             for j, c in enumerate(problem.coordinates):
-                if c.name == name.value:
+                if c.name == name:
                     z[j] = 0.0
             return problem.predicted(z)
         gone = CATALOGUE[name].absent
@@ -109,11 +110,35 @@ def _without(study: Searched, chosen: Names, name: Name, i: int) -> list[Array] 
         return None
 
 
-def directed(study: Searched, c: Component, traces: Sequence[Traced]) -> Component:
+def directed(c: Component, traces: Sequence[Traced]) -> Component:
     """A component of the answer with what it does to the force."""
     name = c.members[0]
-    adds: dict[str, list[tuple[Residual, Array]]] = {}
-    for t in traces:
-        if name in t.forces.without_f0:
-            adds.setdefault(t.forces.fibre, []).append((t.residual, t.forces.adds_f0(name)))
+    adds = [(t.residual, t.forces.adds_f0(name)) for t in traces if name in t.forces.without_f0]
     return replace(c, direction=direction(adds)) if adds else c
+
+
+def direction(adds_f0: Sequence[tuple[Residual, Array]]) -> str:
+    """Where a component raises force most and where it lowers it most, in plain words.
+
+    Args:
+        adds_f0: for each trial what the component adds to the force at the residual's times, F0.
+    """
+    sums: dict[str, list[float]] = {}
+    for residual, adds in adds_f0:
+        for phase in residual.phases:
+            inside = (residual.time_s >= phase.start_s) & (residual.time_s <= phase.end_s)
+            if np.any(inside):
+                sums.setdefault(phase_words(phase.name), []).append(float(np.mean(adds[inside])))
+    if not sums:
+        return ""
+    means = {phase: float(np.mean(values)) for phase, values in sums.items()}
+    up, down = max(means, key=lambda p: means[p]), min(means, key=lambda p: means[p])
+    parts = []
+    if means[up] > _LEAST_F0:
+        parts.append(f"raises force in the {up} by {percent(means[up])} % F0")
+    if means[down] < -_LEAST_F0:
+        parts.append(f"lowers it in the {down} by {percent(-means[down])} % F0")
+    if len(parts) == 1 and means[up] <= _LEAST_F0:
+        parts = [parts[0].replace("lowers it", "lowers force")]
+    text = " and ".join(parts)
+    return f"{text} on average" if text else "changes force by less than 0.05 % F0 on average in every phase"

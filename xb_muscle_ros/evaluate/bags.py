@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +28,7 @@ from xb_muscle_ros.trials.bag_reading import TrialBag
 from xb_muscle_ros.trials.completing import CONDITIONING_FOUND, Known, pca_of
 from xb_muscle_ros.trials.study import left_out, trial_of_bag
 from xb_muscle_ros.trials.trial import Array, Trial
+from xb_muscle_ros.work.plain import to_plain
 
 Task = dict[str, Any]
 _LEAST_STRETCH_L0 = 0.01
@@ -38,7 +38,6 @@ def tasks(request: Request, bags: Sequence[Path], fibres: Mapping[str, Path] | N
     """One task for each bag.
 
     Args:
-        request: what to do.
         bags: folders or ``.mcap`` files.
         fibres: fibre files by the fibre's name; None: a bag's fibre name selects the package's fibre file.
     """
@@ -50,7 +49,7 @@ def tasks(request: Request, bags: Sequence[Path], fibres: Mapping[str, Path] | N
         "method": request.method,
         "settle_s": request.settle_s,
         "measured_only": request.measured_only,
-        "known": asdict(request.known),
+        "known": to_plain(request.known),
         "trials_of": request.only,
     }
     # Workers may stand in another folder; messages name bags as the user did.
@@ -58,12 +57,7 @@ def tasks(request: Request, bags: Sequence[Path], fibres: Mapping[str, Path] | N
 
 
 def tasks_of_fibres(task: Mapping[str, Any], fibres: Sequence[str]) -> tuple[list[Task], str | None]:
-    """Tasks for a bag of several fibres, one for each trial that is taken, and a line on those that are not.
-
-    Args:
-        task: of the bag.
-        fibres: in the bag.
-    """
+    """Tasks for a bag of several fibres, one for each trial that is taken, and a line on those that are not."""
     taken = list(fibres)
     if task["trials_of"] is not None:
         taken = [name for name in fibres if name == task["trials_of"]]
@@ -85,7 +79,7 @@ def evaluate_bag(task: Mapping[str, Any]) -> dict[str, Any]:
         text = str(error).replace(task["path"], task["bag"])
         problem = text if task["bag"] in text else f"bag {task['bag']}: {text}"
         found = Evaluated(label, problem=problem, unserved=error.fibre if isinstance(error, NoFibreFile) else "")
-    return asdict(found)
+    return to_plain(found)
 
 
 def _evaluated(task: Mapping[str, Any], label: str) -> Evaluated:

@@ -12,10 +12,6 @@ from xb_muscle_ros.trials.trial import Phase, Trial
 def check_trial(trial: Trial, where: str) -> None:
     """Refuse a trial that cannot be evaluated, though its values are those of a muscle (`trials.checks`).
 
-    Args:
-        trial: as read, complete.
-        where: the bag, for messages.
-
     Raises:
         UserError: no measured force, or none where the length has its stretches; pCa missing.
     """

@@ -2,26 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.evaluate.force_scores import force_rows
+from xb_muscle_ros.evaluate.results import Results
 from xb_muscle_ros.evaluate.srs_scores import READINGS, rows
 from xb_muscle_ros.evaluate.srs_table import SrsTable
 from xb_muscle_ros.evaluate.trials import MEASURED, WINDOWS, Trials
-from xb_muscle_ros.scores.activation import CLASSES
+from xb_muscle_ros.scores.conditions import CLASSES
 from xb_muscle_ros.scores.estimate import Estimate, quotient
 from xb_muscle_ros.scores.readout import ISOMETRIC, SRS_CONDITIONING, SRS_TEST, references, relative_srs
 from xb_muscle_ros.scores.redevelopment import K_TR
 
-Row = dict[str, Any]
+Row = Mapping[str, Any]
 _RELATIVE = "relative_srs"
 # Of tables that may be without rows.
-COLUMNS = {"srs_cells.csv": (
+COLUMNS = {"srs_cells": (
     "of", "fibre", "pca", "activation", "isometric_f0", "recovery_s", "amplitude_l0", "srs_test", "srs_test_se",
     "relative_srs", "relative_srs_se",
 )}  # fmt: skip
+
+
+def tables(results: Results) -> dict[str, Iterable[Row]]:
+    """Rows of every table that an evaluation has, by the name of its file."""
+    found, made = results.sections, dict[str, Iterable[Row]]()
+    if results.trials is not None:
+        made["trials"] = trial_rows(results.trials)
+    if found.force_rmsd is not None and found.force_rmsd.overall:
+        made["force_rmsd"] = force_rows(found.force_rmsd)
+    if results.data is not None:
+        made["relative_srs"] = relative_rows(results.tables, results.data)
+        made["srs_cells"] = cell_rows({MEASURED: results.data, **results.tables})
+    if found.paper is not None:
+        made["srs_rmsd"] = (row.as_row() for row in found.paper.readings)
+    return made
 
 
 def trial_rows(trials: Trials) -> Iterator[Row]:
@@ -34,7 +51,7 @@ def trial_rows(trials: Trials) -> Iterator[Row]:
             if at is not None:
                 below = trials.found[usable[at][0]].scores.get(of, {}).get(SRS_TEST, Estimate(None))
                 test = found.get(SRS_TEST, Estimate(None))
-                found[_RELATIVE] = relative_srs(test._replace(why=""), below._replace(why=""), usable[at][0] == index)
+                found[_RELATIVE] = relative_srs(test, below, usable[at][0] == index)
             why = [f"{name}: {each.why}" for name, each in found.items() if each.why and name != _RELATIVE]
             relative = found.get(_RELATIVE, Estimate(None))
             if relative.value is None and relative.why:
@@ -76,7 +93,7 @@ def cell_rows(tables: Mapping[str, SrsTable]) -> Iterator[Row]:
 
 
 def _with_errors(found: Mapping[str, Estimate], *names: str) -> Row:
-    row = {}
+    row: dict[str, Any] = {}
     for name in names:
         row[name], row[f"{name}_se"], _ = found.get(name, Estimate(None))
     return row

@@ -80,7 +80,6 @@ def enhancement_task(pair: Pair, shared: Task) -> Task:
     """Task that compares the two trials of a pair.
 
     Args:
-        pair: of `enhancement_pairs`.
         shared: a task of `bags.tasks`, for all that does not depend on the bag.
     """
     stretched, isometric = pair

@@ -78,10 +78,8 @@ class ForceScores:
     """``force_rmsd`` of ``evaluate.json``.
 
     Attributes:
-        overall: over all trials.
         common_condition: that slices have in common.
         slices: by what is varied, one for each level.
-        paired_t_tests: between models.
         unit: of all RMSD.
     """
 

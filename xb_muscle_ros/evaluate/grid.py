@@ -9,7 +9,7 @@ a second.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from xb_muscle_ros.scores.estimate import Estimate, Missing
 from xb_muscle_ros.scores.redevelopment import redevelopment
 from xb_muscle_ros.simulation.stretches import followed, onset_stiffness, stretched_and_back
 from xb_muscle_ros.trials.trial import Array
+from xb_muscle_ros.work.plain import to_plain
 
 AMPLITUDES_L0 = (0.0, 0.0012, 0.0038, 0.0121, 0.0216, 0.0288, 0.0383, 0.0532, 0.0682)
 RECOVERIES_S = (0.001, 0.01, 0.05, 0.1, 0.2, 0.316, 0.5, 1.0, 3.16, 10.0)
@@ -79,11 +80,6 @@ class Cells:
     isometric_f0: float
     k_tr: Estimate
 
-    @classmethod
-    def of_plain(cls, row: Mapping[str, Any]) -> Cells:
-        """From plain data, as `simulate` gives it and JSON gives it back."""
-        return cls(**{**row, "k_tr": Estimate(*row["k_tr"])})
-
 
 def simulate(task: Mapping[str, Any]) -> dict[str, Any]:
     """`Cells` of one fibre and pCa, a task of `tasks`, as plain data.
@@ -92,7 +88,7 @@ def simulate(task: Mapping[str, Any]) -> dict[str, Any]:
         UserError, StateViolation: see `Muscle.settle` and `Muscle.step`.
     """
     with naming(f"simulation at pCa {task['pca']:g}"):
-        return asdict(_simulated(muscle_of_plain(task["fibre"]), task))
+        return to_plain(_simulated(muscle_of_plain(task["fibre"]), task))
 
 
 def _simulated(muscle: Muscle, task: Mapping[str, Any]) -> Cells:
@@ -117,7 +113,6 @@ def table(label: str, fibres: Sequence[Fibre], made: Sequence[Task], results: Se
     """Results of one set's tasks as a table.
 
     Args:
-        label: of the table.
         fibres: in the order of the tasks.
         made, results: tasks of these fibres, and what `simulate` made of them.
     """

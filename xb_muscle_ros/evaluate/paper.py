@@ -11,8 +11,7 @@ import numpy as np
 from xb_muscle_ros.evaluate.sets import ModelSet
 from xb_muscle_ros.evaluate.srs_scores import ALL_READINGS, READINGS, Reading, SrsScores, profile_rmsd, score
 from xb_muscle_ros.evaluate.srs_table import SrsTable
-from xb_muscle_ros.scores.activation import CLASSES
-from xb_muscle_ros.scores.conditions import LARGE_ABOVE_L0, LARGE_BELOW_S, SETS
+from xb_muscle_ros.scores.conditions import CLASSES, LARGE_ABOVE_L0, LARGE_BELOW_S, SETS
 
 
 class Reported(NamedTuple):
@@ -20,7 +19,6 @@ class Reported(NamedTuple):
 
     Attributes:
         quantity: key of what is computed in its place, see `computed`.
-        model: parameter set.
         lower, upper: what the paper gives: a value (equal), or a bound (the other is infinite).
         where: place in the paper.
     """

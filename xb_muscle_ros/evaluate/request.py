@@ -24,7 +24,6 @@ class Request:
         skip_bad: leave recordings that cannot be used out, in place of refusing all.
         empirical: table of measured SRS; its presence asks for the paper's grid.
         golden: the authors' released output.
-        work: where to compute.
         known: what is known of L0 and F0 beside bags and fibre files.
         only: take trials of this fibre and no other.
     """

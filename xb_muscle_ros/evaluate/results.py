@@ -20,7 +20,6 @@ class Sections:
     """Content of ``evaluate.json``; what was not computed is None there, and left out of the file.
 
     Attributes:
-        sets: parameter sets.
         trials, force_rmsd, notes: of recordings.
         paper: the paper's numbers beside ours.
         srs: of models beside measured SRS: of the paper's grid where it was computed, else of recordings.

@@ -36,6 +36,7 @@ from xb_muscle_ros.scores.enhancement import AFTER_S
 from xb_muscle_ros.trials.bags import find_bags
 from xb_muscle_ros.trials.completing import counted
 from xb_muscle_ros.work import Options, run, stream
+from xb_muscle_ros.work.plain import from_plain
 
 JOURNAL = "evaluate.journal"
 _MAXIMAL_PCA = 4.5
@@ -45,7 +46,6 @@ def evaluate(request: Request, tell: Callable[[str], None] = lambda line: None) 
     """Compute everything; nothing but the journal is written.
 
     Args:
-        request: what to do.
         tell: called with each line on a recording that cannot be used.
 
     Raises:
@@ -116,7 +116,7 @@ def _of_bags(request: Request, made: Sequence[Mapping[str, Any]]) -> tuple[list[
 
     def all_of(tasks: Sequence[Mapping[str, Any]], label: str) -> list[Evaluated]:
         found = stream(bag_tasks.evaluate_bag, tasks, _work(request, label))
-        of = {index: Evaluated.of_plain(row) for index, row in found}
+        of = {index: from_plain(Evaluated, row) for index, row in found}
         return [of[index] for index in range(len(tasks))]
 
     whole = all_of(made, "recordings")
@@ -177,7 +177,7 @@ def _with_paper(request: Request, before: Results, data: SrsTable, golden: Mappi
     warnings = list(before.warnings)
     for each in models:
         of_set = [next(found) for _ in range(len(each.fibres) * len(grid.PCAS))]
-        tasks, cells = [task for task, _ in of_set], [grid.Cells.of_plain(row) for _, row in of_set]
+        tasks, cells = [task for task, _ in of_set], [from_plain(grid.Cells, row) for _, row in of_set]
         tables[each.name] = grid.table(each.title, list(each.fibres.values()), tasks, cells)
         problems = [cell.k_tr.why for cell in cells if cell.k_tr.why]
         if problems:

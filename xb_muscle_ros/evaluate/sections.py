@@ -56,7 +56,6 @@ class SrsSection:
     """SRS of models beside measured SRS.
 
     Attributes:
-        measured_fibres: that were measured.
         aic_relative_to, aic_note: see `AicReference`.
         readings: what each is.
         left_out: by reading, how many measured relative SRS are ``left_out`` of means, and ``of`` how many.

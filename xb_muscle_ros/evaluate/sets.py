@@ -77,7 +77,6 @@ def file_serving(files: Mapping[str, str | Path] | None, fibre: str) -> Path:
 
     Args:
         files: that were given, by the fibre's name; None: those of the package.
-        fibre: name in the trial.
 
     Raises:
         NoFibreFile: several were given and none is the fibre's, or none was given and the package has none.

@@ -12,8 +12,8 @@ import numpy as np
 
 from xb_muscle_ros.evaluate.sets import REFERENCE_OF_AIC, ModelSet
 from xb_muscle_ros.evaluate.srs_table import UNCONDITIONED, SrsTable
-from xb_muscle_ros.scores.activation import CLASSES
 from xb_muscle_ros.scores.conditions import (
+    CLASSES,
     COMMON_AMPLITUDE_L0,
     COMMON_CLASS,
     COMMON_RECOVERY_S,

@@ -13,8 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.scores.activation import activation_class
-from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0, CONDITIONS
+from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0, CONDITIONS, activation_class
 from xb_muscle_ros.scores.relative import Averaged, ByClass, by_class, nanmean, over_fibres
 from xb_muscle_ros.trials.trial import Array
 
@@ -78,7 +77,6 @@ class SrsTable:
         """SRS of the unconditioned stretch at each pCa, and standard error (NaN where not known), shape (pca,), F0/L0.
 
         Args:
-            fibre: name.
             kind: one of `UNCONDITIONED`.
         """
         values, errors = np.full(self.pca.size, np.nan), np.full(self.pca.size, np.nan)
@@ -134,14 +132,26 @@ class SrsTable:
             force = np.array([np.nan if i is None else theirs[i] for i in places])
         return activation_class(force)
 
+    @functools.lru_cache(maxsize=256)  # noqa: B019 - a run has a few tables, and all of them to its end
     def pooled(self, kind: str, by: SrsTable | None = None) -> dict[str, ByClass]:
         """Each fibre by activation class, shape (classes, recovery, amplitude); see `relative`."""
-        return _pooled(self, kind, by)
+        found = {}
+        for name, fibre in self.fibres.items():
+            below, below_se = self.unconditioned(name, kind)
+            test = np.where(self.sound(name, kind), fibre.test, np.nan)
+            found[name] = by_class(test, below, self.classes(name, by), fibre.test_se, below_se)
+        return found
+
+    @functools.cached_property
+    def _places_of_conditions(self) -> tuple[tuple[int, int, int], ...]:
+        """Condition, recovery and amplitude index of the conditions that the axes have."""
+        places = [(place(self.recovery_s, c.recovery_s), place(self.amplitude_l0, c.amplitude_l0)) for c in CONDITIONS]
+        return tuple((k, i, j) for k, (i, j) in enumerate(places) if i is not None and j is not None)
 
     def at_conditions(self, values: Array) -> Array:
         """Of values of shape (..., recovery, amplitude) those at the `CONDITIONS`; NaN where not held."""
         picked = np.full((*values.shape[:-2], len(CONDITIONS)), np.nan)
-        for k, i, j in _places_of_conditions(self):
+        for k, i, j in self._places_of_conditions:
             picked[..., k] = values[..., i, j]
         return picked
 
@@ -161,27 +171,9 @@ class SrsTable:
         return SrsTable(self.label, self.pca, self.recovery_s, self.amplitude_l0, kept)
 
 
-@functools.lru_cache(maxsize=256)
-def _pooled(table: SrsTable, kind: str, by: SrsTable | None) -> dict[str, ByClass]:
-    found = {}
-    for name, fibre in table.fibres.items():
-        below, below_se = table.unconditioned(name, kind)
-        test = np.where(table.sound(name, kind), fibre.test, np.nan)
-        found[name] = by_class(test, below, table.classes(name, by), fibre.test_se, below_se)
-    return found
-
-
-@functools.lru_cache(maxsize=256)
-def _places_of_conditions(table: SrsTable) -> tuple[tuple[int, int, int], ...]:
-    """Condition, recovery and amplitude index of the conditions that a table's axes have."""
-    places = [(place(table.recovery_s, c.recovery_s), place(table.amplitude_l0, c.amplitude_l0)) for c in CONDITIONS]
-    return tuple((k, i, j) for k, (i, j) in enumerate(places) if i is not None and j is not None)
-
-
 def near(values: Array, level: float) -> npt.NDArray[np.bool_]:
     """Which values are one nominal value."""
-    found: npt.NDArray[np.bool_] = np.isclose(values, level, rtol=1e-3, atol=1e-6)
-    return found
+    return np.isclose(values, level, rtol=1e-3, atol=1e-6)
 
 
 def levels(values: Array) -> Array:

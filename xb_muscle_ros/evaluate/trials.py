@@ -6,7 +6,6 @@ import functools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -63,7 +62,6 @@ class Evaluated:
         several: fibres of a bag that has more than one, where the task does not choose; then nothing else.
         problem: why it cannot be used, one line; then nothing else but `unserved`.
         unserved: the fibre that no fibre file serves.
-        facts: of the trial.
         scores: what `MEASURED` force and each model show, by quantity: ``rmsd_whole``, ``rmsd_conditioning`` and
             ``rmsd_test`` (F0), the keys of `scores.readout.TEXT` (F0/L0, F0) and ``k_tr`` (1/s).
         pushes: models that push where a muscle would be slack, and a line on each.
@@ -82,13 +80,6 @@ class Evaluated:
     missing: Sequence[str] = ()
     warnings: Sequence[str] = ()
     notes: Sequence[str] = ()
-
-    @classmethod
-    def of_plain(cls, row: Mapping[str, Any]) -> Evaluated:
-        """From plain data, as `evaluate_bag` gives it and JSON gives it back."""
-        facts = None if row["facts"] is None else Facts(**row["facts"])
-        scores = {of: {name: Estimate(*each) for name, each in held.items()} for of, held in row["scores"].items()}
-        return cls(**{**row, "facts": facts, "scores": scores})
 
 
 class Trials:
@@ -194,9 +185,7 @@ def srs_table(trials: Trials, of: str, label: str) -> SrsTable | None:
     """SRS and isometric force of the trials of the paper's protocol; repeats of a condition are averaged.
 
     Args:
-        trials: all.
         of: parameter set, or `MEASURED`.
-        label: of the table.
 
     Returns:
         None where no trial has pCa, amplitude and recovery time.

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
 
-from xb_muscle_ros.evaluate import csv_rows
-from xb_muscle_ros.evaluate.force_scores import force_rows
+from xb_muscle_ros.evaluate.csv_rows import COLUMNS, tables
 from xb_muscle_ros.evaluate.report import write_up
 from xb_muscle_ros.evaluate.request import Request
 from xb_muscle_ros.evaluate.results import Results
-from xb_muscle_ros.evaluate.trials import MEASURED
 from xb_muscle_ros.files import matching, write_json, write_text
 from xb_muscle_ros.tables import write_csv
 from xb_muscle_ros.trials.bag_files import remove_results
@@ -21,8 +17,8 @@ _FIGURES = ("force_rmsd", "relative_srs", "srs_surfaces")
 
 def older_results(out: Path) -> list[Path]:
     """What an older evaluation left in a folder; not its journal, which holds what is computed already."""
-    tables = ("trials", "force_rmsd", "relative_srs", "srs_cells", "srs_rmsd")
-    return matching(out, r"evaluate\.(json|md)", rf"({'|'.join(tables)})\.csv", rf"({'|'.join(_FIGURES)})\.(png|pdf)")
+    csv = ("trials", "force_rmsd", "relative_srs", "srs_cells", "srs_rmsd")
+    return matching(out, r"evaluate\.(json|md)", rf"({'|'.join(csv)})\.csv", rf"({'|'.join(_FIGURES)})\.(png|pdf)")
 
 
 def write(request: Request, results: Results) -> list[Path]:
@@ -33,22 +29,13 @@ def write(request: Request, results: Results) -> list[Path]:
 
 def write_tables(out: Path, results: Results) -> list[Path]:
     """Write ``evaluate.json``, ``evaluate.md`` and the CSV files."""
-    found = results.sections
-    write_json(out / "evaluate.json", found)
-    write_text(out / "evaluate.md", write_up(found))
-    tables: dict[str, Iterable[Mapping[str, Any]]] = {}
-    if results.trials is not None:
-        tables["trials.csv"] = csv_rows.trial_rows(results.trials)
-    if found.force_rmsd is not None and found.force_rmsd.overall:
-        tables["force_rmsd.csv"] = force_rows(found.force_rmsd)
-    if results.data is not None:
-        tables["relative_srs.csv"] = csv_rows.relative_rows(results.tables, results.data)
-        tables["srs_cells.csv"] = csv_rows.cell_rows({MEASURED: results.data, **results.tables})
-    if found.paper is not None:
-        tables["srs_rmsd.csv"] = (row.as_row() for row in found.paper.readings)
-    for name, rows in tables.items():
-        write_csv(out / name, rows, csv_rows.COLUMNS.get(name, ()))
-    return [out / name for name in ("evaluate.json", "evaluate.md", *tables)]
+    write_json(out / "evaluate.json", results.sections)
+    write_text(out / "evaluate.md", write_up(results.sections))
+    written = [out / "evaluate.json", out / "evaluate.md"]
+    for name, rows in tables(results).items():
+        written.append(out / f"{name}.csv")
+        write_csv(written[-1], rows, COLUMNS.get(name, ()))
+    return written
 
 
 def draw_figures(out: Path, results: Results) -> list[Path]:

@@ -65,9 +65,7 @@ def nuisances_of(
 
 def choices_of(bound: Mapping[str, tuple[float, float]], prior: Mapping[str, tuple[float, float]]) -> dict[str, Choice]:
     """Bounds and priors (mean and SD) by parameter, in its unit."""
-    made: dict[str, Choice] = {}
-    for name, (low, high) in bound.items():
-        made[name] = replace(made.get(name, Choice()), lower=low, upper=high)
+    made = {name: Choice(lower=low, upper=high) for name, (low, high) in bound.items()}
     for name, (mean, sd) in prior.items():
         made[name] = replace(made.get(name, Choice()), prior_mean=mean, prior_sd=sd)
     return made

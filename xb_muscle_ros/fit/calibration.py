@@ -21,8 +21,7 @@ from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.fit.problem import Problem, moves_simulation, touches
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS, Scope
 from xb_muscle_ros.models.muscle import Muscle
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # How well the model is trusted to know isometric force, F0; all samples of it count as one.
 _FORCE_SD_F0 = 0.005
@@ -49,8 +48,6 @@ def own_faults(problem: Problem, trial: FitTrial, known: bool = True) -> tuple[C
     """Faults that a problem has of every trial or solution, as coordinates of this trial.
 
     Args:
-        problem: of the fit.
-        trial: any.
         known: leave out those of which the problem has this trial's value, as a solution's that the fit met.
     """
     kinds = {
@@ -70,7 +67,6 @@ def calibrated_force(problem: Problem, z: Array, trial: FitTrial, known: bool = 
 
     Args:
         problem: of the fit; a correction is added where it has one, and must then have one for this trial.
-        z: fitted point.
         trial: one that the fit did not see; need not be of the problem.
         known: False estimates also what the fit knows of the trial's solution: for a point that was not fitted.
 

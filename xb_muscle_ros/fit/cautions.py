@@ -33,7 +33,6 @@ def cautions(fitted: Fitted, parameters: Sequence[Mapping[str, Any]], trials: Se
     """All lines.
 
     Args:
-        fitted: the fit.
         parameters, trials: rows of `report.parameter_rows` and `report.trial_rows`.
     """
     problem = fitted.problem

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS, Scope
@@ -16,8 +14,6 @@ from xb_muscle_ros.mechanisms import Entry
 from xb_muscle_ros.models.catalogue import mechanisms_of
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.parameters import PARAMETERS
-
-Array = npt.NDArray[np.float64]
 
 FITTED_BY_THE_PAPER = (
     "f", "k11", "k21", "k22", "dLcrit", "kon", "koop", "kappa", "n", "JF", "vmax", "kse", "kse0", "kpe", "Fpe0",
@@ -96,7 +92,6 @@ def free_names(
     """Names of the parameters that are moved.
 
     Args:
-        fibre: its model.
         free: names to move; None: those that the paper fitted, and those of the model's mechanisms.
         fixed, ties: see `parameter_coordinates`.
     """
@@ -117,7 +112,6 @@ def parameter_coordinates(
     Args:
         fibre: start values, model and method.
         free: see `free_names`.
-        fixed: names not to move.
         ties: name -> name whose value it takes.
         choices: bounds and priors by name.
 
@@ -271,22 +265,3 @@ def fault_coordinates(
         groups = {Scope.TRIAL: trials, Scope.SOLUTION: solutions, Scope.STUDY: ("",)}[row.scope]
         found += [Coordinate(name, g, False, row.lower, row.upper, 0.0, 0.0, sd) for g in dict.fromkeys(groups)]
     return tuple(found)
-
-
-def to_json(coordinates: Sequence[Coordinate]) -> list[dict[str, Any]]:
-    """Plain data; a missing prior is null."""
-    return [{**c.__dict__, "prior_sd": None if math.isinf(c.prior_sd) else c.prior_sd} for c in coordinates]
-
-
-def from_json(rows: Sequence[Mapping[str, Any]]) -> tuple[Coordinate, ...]:
-    """Coordinates from plain data."""
-    return tuple(
-        Coordinate(
-            **{
-                **row,
-                "prior_sd": math.inf if row["prior_sd"] is None else row["prior_sd"],
-                "others": tuple(row["others"]),
-            }
-        )
-        for row in rows
-    )

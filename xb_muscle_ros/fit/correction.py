@@ -10,12 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 
 @dataclass(frozen=True)
@@ -49,32 +47,8 @@ class Correction:
             KeyError: the trial has no correction; held-out ones have none.
         """
         slopes = self.force_slopes.get(name)
-        added: Array = self.force[name] if slopes is None else self.force[name] + slopes @ (z - self.at)
-        return added
+        return self.force[name] if slopes is None else self.force[name] + slopes @ (z - self.at)
 
     def of_features(self, z: Array) -> Array:
         """What to add to the distances of the training features at a point, in standard deviations."""
-        added: Array = self.features + (self.feature_slopes @ (z - self.at) if self.at.size else 0.0)
-        return added
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain data."""
-        return {
-            "at": self.at.tolist(),
-            "force": {name: values.tolist() for name, values in self.force.items()},
-            "force_slopes": {name: values.tolist() for name, values in self.force_slopes.items()},
-            "features": self.features.tolist(),
-            "feature_slopes": self.feature_slopes.tolist(),
-        }
-
-    @staticmethod
-    def from_json(row: Mapping[str, Any]) -> Correction:
-        """A correction from plain data."""
-        at = np.array(row["at"], dtype=np.float64)
-        return Correction(
-            at=at,
-            force={name: np.array(values) for name, values in row["force"].items()},
-            force_slopes={name: np.array(values) for name, values in row["force_slopes"].items()},
-            features=np.array(row["features"], dtype=np.float64),
-            feature_slopes=np.array(row["feature_slopes"], dtype=np.float64).reshape(len(row["features"]), at.size),
-        )
+        return self.features + (self.feature_slopes @ (z - self.at) if self.feature_slopes.size else 0.0)

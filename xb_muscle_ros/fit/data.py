@@ -14,11 +14,8 @@ from xb_muscle_ros.scores.rmsd import windows
 from xb_muscle_ros.scores.steady import steady_part
 from xb_muscle_ros.simulation.offline import calcium_per_step
 from xb_muscle_ros.trials.stamps import to_ns
-from xb_muscle_ros.trials.trial import Trial
-
-Array = npt.NDArray[np.float64]
-
-_ARRAYS = ("time_s", "length_l0", "calcium_um", "force_time_s", "measured_f0")
+from xb_muscle_ros.trials.trial import Array, Trial
+from xb_muscle_ros.work.plain import from_plain, to_plain
 
 
 @dataclass(frozen=True)
@@ -26,7 +23,6 @@ class FitTrial:
     """One trial, ready to be simulated and compared.
 
     Attributes:
-        name: of the trial.
         solution: of the bathing solution; trials of one share its faults.
         order: how many trials of the fibre came before it.
         held_out: whether it is kept out of the fit.
@@ -55,23 +51,21 @@ class FitTrial:
     def steady(self) -> npt.NDArray[np.bool_]:
         """Which of the force that counts is steady before the first change of length, shape (k,)."""
         begin, end = self.steady_s or (np.inf, -np.inf)
-        inside: npt.NDArray[np.bool_] = (self.force_time_s >= begin) & (self.force_time_s <= end)
-        return inside
+        return (self.force_time_s >= begin) & (self.force_time_s <= end)
 
     @property
     def dt_s(self) -> Array:
         """Time between samples in whole nanoseconds, as messages have it, shape (n - 1,)."""
-        steps: Array = np.diff(to_ns(self.time_s)) / 1e9
-        return steps
+        return np.diff(to_ns(self.time_s)) / 1e9
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return {**self.__dict__, **{name: getattr(self, name).tolist() for name in _ARRAYS}}
+        return to_plain(self)
 
     @staticmethod
     def from_json(row: Mapping[str, Any]) -> FitTrial:
         """A trial from plain data."""
-        return FitTrial(**{**row, **{name: np.array(row[name], dtype=np.float64) for name in _ARRAYS}})
+        return from_plain(FitTrial, row)
 
 
 def fit_trials(

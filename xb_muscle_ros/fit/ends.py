@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.fit.solve import Objective, Solution
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 DATA, PRIOR, BOUND, UNSEEN, UNSETTLED = "data", "prior", "bound", "nothing", "search"
 """Ends of an interval; a bound of others is ``bound of k21``. Only data close one."""
@@ -22,21 +21,14 @@ _NEAR = 0.02
 _MATTERS = 0.9
 
 
-def closes(ended_by: str) -> bool:
-    """Whether an end is one of the likelihood."""
-    return ended_by == DATA
-
-
 def profile_end(
     objective: Objective, best: Solution, end: Solution, index: int, inflation: float, wanted: float
 ) -> str:
     """What ends a profile at a point where the likelihood ratio reaches its limit.
 
     Args:
-        objective: of the fit.
         best: its best point.
         end: the best point with the coordinate held at the end of its interval.
-        index: of the coordinate.
         inflation: of its variance, see `uncertainty.Curvature`.
         wanted: limit of the root of the likelihood ratio.
     """
@@ -98,7 +90,6 @@ def quadratic_ends(
     """Both ends of each coordinate's interval by the curvature at the best point, and what ends them.
 
     Args:
-        coordinates: of the fit.
         z: its best point, on the moved scale.
         covariance, prior_share, weak: see `uncertainty.Curvature`.
         wanted: half width, in standard deviations.

@@ -6,16 +6,13 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError, naming
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.simulation.stretches import onset_stiffness, stretched_and_back, waited
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 KINDS = ("isometric_force", "srs_test", "srs_conditioning")
 
@@ -28,7 +25,6 @@ class Feature:
         kind: of `KINDS`; isometric force in F0, stiffness of a stretch in F0/L0.
         pca: -log10 of free calcium in M.
         recovery_s, amplitude_l0: of the conditioning before a test stretch, s and L0; of no account for other kinds.
-        value: measured.
         sd: its standard deviation, with what the model cannot be expected to meet.
         held_out: whether it is kept out of the fit.
     """
@@ -69,7 +65,6 @@ def simulated(muscle: Muscle, features: Sequence[Feature], shifts: Mapping[float
     """What a fibre shows for each feature, shape (features,).
 
     Args:
-        muscle: the fibre.
         features: at any conditions; those of one pCa and amplitude share what went before.
         shifts: pCa shift of the solution by stated pCa.
 
@@ -114,7 +109,6 @@ def measured(
 
     Args:
         path: JSON with ``pCa``, ``recovery_s``, ``amplitude_L0``, ``fibres``: quantity -> [pCa][recovery][amplitude].
-        fibre: name of the fibre.
         stiffness: with SRS, or isometric force alone.
         tell: called with a line for each solution whose test stretches are left out.
 
@@ -169,13 +163,3 @@ def feature(kind: str, pca: float, recovery_s: float, amplitude_l0: float, value
     """A measured value with the standard deviation that its kind has."""
     sd = _FORCE_SD_F0 if kind == "isometric_force" else _SRS_SD + _SRS_SHARE * abs(value)
     return Feature(kind, pca, recovery_s, amplitude_l0, value, sd)
-
-
-def to_json(features: Sequence[Feature]) -> list[dict[str, Any]]:
-    """Plain data."""
-    return [dict(f.__dict__) for f in features]
-
-
-def from_json(rows: Sequence[Mapping[str, Any]]) -> tuple[Feature, ...]:
-    """Features from plain data."""
-    return tuple(Feature(**row) for row in rows)

@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Directions of less than this share of the largest curvature, in units of each coordinate's own, are not seen.
 _UNSEEN = 1e-9
@@ -57,8 +56,7 @@ class LinearFit:
     @cached_property
     def score(self) -> Array:
         """How a sample bears on the gradient of the cost, shape (samples, coordinates)."""
-        out: Array = self.slopes * (self.weights**2)[:, None]
-        return out
+        return self.slopes * (self.weights**2)[:, None]
 
     @cached_property
     def _seen(self) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
@@ -75,8 +73,7 @@ class LinearFit:
     def inverse(self) -> Array:
         """Inverse of the curvature where it is seen: the covariance, had every weight its sample's own noise."""
         root, _, _ = self._seen
-        out: Array = root @ root.T
-        return out
+        return root @ root.T
 
     @property
     def weak(self) -> npt.NDArray[np.bool_]:
@@ -95,13 +92,11 @@ class LinearFit:
 
     def solved(self, score: Array) -> Array:
         """Coordinates that meet a score, shape (coordinates, columns) both."""
-        out: Array = self.inverse @ score
-        return out
+        return self.inverse @ score
 
     def residual(self, change: Array) -> Array:
         """What a change of the data leaves after the refit, shape (samples, columns)."""
-        out: Array = change - self.slopes @ self.moved(change)
-        return out
+        return change - self.slopes @ self.moved(change)
 
     def prior_residual(self, draws: int, random: np.random.Generator) -> Array:
         """Residuals that the priors cause when the truth lies where they expect it, shape (samples, draws)."""
@@ -110,5 +105,4 @@ class LinearFit:
         # Information times a deviation of that covariance.
         root = vectors[:, known] * np.sqrt(values[known])
         score = root @ random.standard_normal((int(np.count_nonzero(known)), draws))
-        out: Array = self.slopes @ self.solved(score)
-        return out
+        return self.slopes @ self.solved(score)

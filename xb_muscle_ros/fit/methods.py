@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.distribution.gaussian import Gaussian
 from xb_muscle_ros.errors import UserError
@@ -16,9 +15,9 @@ from xb_muscle_ros.fit.problem import Problem, moves_simulation, touches
 from xb_muscle_ros.fit.training import Training, step_of
 from xb_muscle_ros.models.composition import Composition
 from xb_muscle_ros.models.registry import compose
+from xb_muscle_ros.trials.trial import Array
 from xb_muscle_ros.work import Options, run
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.work.plain import from_plain, to_plain
 
 # Of the correction's slopes, on the moved scale. Steps of 1 ms on a strain grid are halved where need be, and so err in
 # jumps of up to 3e-6 F0; the difference between the methods bends little, so that so large a step does it no harm.
@@ -51,7 +50,7 @@ def difference(problem: Problem, z: Array) -> Difference:
     Raises:
         UserError: see `Problem.true_forces`.
     """
-    return _from_json(_difference(problem, z, [t.name for t in Training(problem).trials], True))
+    return _difference(problem, z, [t.name for t in Training(problem).trials], True)
 
 
 def corrected(problem: Problem, z: Array, here: Difference, options: Options) -> Problem:
@@ -84,7 +83,7 @@ def corrected(problem: Problem, z: Array, here: Difference, options: Options) ->
         rows = run(difference_task, [{"problem": plain, **task} for task in tasks], options)
         found = {j: row for j, row in zip(steps, rows, strict=True) if row is not None}
         for j, row in found.items():
-            there, step = _from_json(row), sign * steps[j]
+            there, step = from_plain(Difference, row), sign * steps[j]
             for name, force in there.force.items():
                 force_slopes[name][:, j] = (force - here.force[name]) / step
             if there.features.size:
@@ -98,21 +97,17 @@ def corrected(problem: Problem, z: Array, here: Difference, options: Options) ->
 
 def difference_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
     """Difference at a point in the trials named; None where either method has no solution."""
+    problem = Problem.from_json(task["problem"])
     try:
-        return _difference(Problem.from_json(task["problem"]), np.array(task["z"]), task["trials"], task["features"])
+        return to_plain(_difference(problem, np.array(task["z"]), task["trials"], task["features"]))
     except UserError:
         return None
 
 
-def _difference(problem: Problem, z: Array, names: Sequence[str], with_features: bool) -> dict[str, Any]:
+def _difference(problem: Problem, z: Array, names: Sequence[str], with_features: bool) -> Difference:
     chosen = replace(problem, trials=tuple(t for t in problem.trials if t.name in names))
     own, fast = Training(chosen), Training(fast_form(chosen))
     pairs = zip(own.trials, own.true_forces(z), fast.true_forces(z), strict=True)
-    force = {trial.name: (detailed - gaussian).tolist() for trial, detailed, gaussian in pairs}
-    features = (own.feature_distance(z) - fast.feature_distance(z)).tolist() if with_features else []
-    return {"force": force, "features": features}
-
-
-def _from_json(row: Mapping[str, Any]) -> Difference:
-    force = {name: np.array(values) for name, values in row["force"].items()}
-    return Difference(force, np.array(row["features"], dtype=np.float64))
+    force = {trial.name: detailed - gaussian for trial, detailed, gaussian in pairs}
+    features = own.feature_distance(z) - fast.feature_distance(z) if with_features else np.empty(0)
+    return Difference(force, features)

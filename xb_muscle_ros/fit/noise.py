@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.scores.noise.residual import LEAST_SD_F0, ResidualNoise, residual_noise
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 
 class Scale(NamedTuple):
@@ -33,7 +31,6 @@ def noise_at(training: Training, z: Array, slopes: tuple[Array, Array]) -> Resid
     """Noise behind the residuals at a point.
 
     Args:
-        training: the data.
         z: the point, on the moved scale.
         slopes: there, see `Training.slopes`.
     """

@@ -15,11 +15,7 @@ BEYOND = 2.0
 
 
 def shown_by(training: Sequence[FitTrial]) -> tuple[list[str], list[str]]:
-    """Ordinary faults that trials can show at all, and the names of the others.
-
-    Args:
-        training: trials that are fitted.
-    """
+    """Ordinary faults that trials can show at all, and the names of the others."""
     moves = any(t.moves for t in training)
     seen = {
         "run_down": len(training) > 1,

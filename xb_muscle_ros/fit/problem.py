@@ -8,11 +8,9 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import naming
-from xb_muscle_ros.fit import features
-from xb_muscle_ros.fit.coordinates import Coordinate, from_json, to_json
+from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.data import FitTrial
 from xb_muscle_ros.fit.features import Feature
@@ -22,8 +20,8 @@ from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.plain import fibre_from_plain, fibre_to_plain
 from xb_muscle_ros.simulation.offline import outputs
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
+from xb_muscle_ros.work.plain import from_plain, to_plain
 
 
 @dataclass(frozen=True)
@@ -136,26 +134,13 @@ class Problem:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, so that a worker elsewhere can have it."""
-        return {
-            "fibre": fibre_to_plain(self.fibre),
-            "trials": [trial.to_json() for trial in self.trials],
-            "coordinates": to_json(self.coordinates),
-            "ties": dict(self.ties),
-            "features": features.to_json(self.features),
-            "correction": None if self.correction is None else self.correction.to_json(),
-        }
+        rest = {name: value for name, value in vars(self).items() if name not in ("fibre", "_places")}
+        return {"fibre": fibre_to_plain(self.fibre), **to_plain(rest)}
 
     @staticmethod
     def from_json(row: Mapping[str, Any]) -> Problem:
         """A problem from plain data."""
-        return Problem(
-            fibre=fibre_from_plain(row["fibre"]),
-            trials=tuple(FitTrial.from_json(trial) for trial in row["trials"]),
-            coordinates=from_json(row["coordinates"]),
-            ties=row["ties"],
-            features=features.from_json(row["features"]),
-            correction=None if row["correction"] is None else Correction.from_json(row["correction"]),
-        )  # fmt: skip
+        return from_plain(Problem, {**row, "fibre": fibre_from_plain(row["fibre"])})
 
 
 def touches(c: Coordinate, trial: FitTrial) -> bool:

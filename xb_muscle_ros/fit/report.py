@@ -9,16 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import chi2
 
 from xb_muscle_ros import __version__
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.calibration import calibrated_force, own_faults
 from xb_muscle_ros.fit.cautions import cautions
-from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.fit.data import FitTrial
-from xb_muscle_ros.fit.ends import closes, quadratic_ends
+from xb_muscle_ros.fit.ends import DATA, quadratic_ends
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.run import Fitted
 from xb_muscle_ros.fit.start import held, unfitted_nuisances
@@ -30,8 +28,7 @@ from xb_muscle_ros.models.fibre_writing import write_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.parameters import PARAMETERS
 from xb_muscle_ros.scores.rmsd import force_rmsd
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Of intervals by the curvature where no level was asked for.
 LEVEL = 0.95
@@ -41,21 +38,19 @@ _AT_BOUND = 1e-3
 
 def trial_rows(fitted: Fitted) -> list[dict[str, Any]]:
     """RMSD (F0) of every trial, training and held-out, before the fit and after."""
-    rows = []
     before, after = _rmsds(fitted.problem, fitted.problem.start), _rmsds(fitted.problem, fitted.best.z)
-    for trial, first, last in zip(fitted.problem.trials, before, after, strict=True):
-        rows.append(
-            {
-                "trial": trial.name,
-                "solution": trial.solution,
-                "held_out": trial.held_out,
-                "weight": trial.weight,
-                "rmsd_before_f0": first,
-                "rmsd_f0": last,
-                **_calibrated(fitted, trial),
-            }
-        )
-    return rows
+    return [
+        {
+            "trial": trial.name,
+            "solution": trial.solution,
+            "held_out": trial.held_out,
+            "weight": trial.weight,
+            "rmsd_before_f0": first,
+            "rmsd_f0": last,
+            **_calibrated(fitted, trial),
+        }
+        for trial, first, last in zip(fitted.problem.trials, before, after, strict=True)
+    ]
 
 
 def _calibrated(fitted: Fitted, trial: FitTrial) -> dict[str, Any]:
@@ -131,7 +126,7 @@ def parameter_rows(fitted: Fitted) -> list[dict[str, Any]]:
         sides = fitted.sides.get(j)
         ends = [(side.end, side.ended_by) for side in sides] if sides else list(quadratic[j])
         row["interval"] = [c.outward(end) for end, _ in ends]
-        row["interval_closed"] = [closes(what) for _, what in ends]
+        row["interval_closed"] = [what == DATA for _, what in ends]
         row["interval_ended_by"] = [what for _, what in ends]
         row["interval_kind"] = "profile" if sides else "curvature"
         if sides:
@@ -144,8 +139,6 @@ def as_json(fitted: Fitted, provenance: Mapping[str, Any], notes: Sequence[str] 
     """Everything, for ``fit.json``.
 
     Args:
-        fitted: the fit.
-        provenance: what it was given.
         notes: lines on what was taken for granted before it began.
     """
     rows = trial_rows(fitted)
@@ -213,7 +206,8 @@ def write_fitted(path: Path, fitted: Fitted, found: Mapping[str, Any]) -> Fibre:
     )
     fibre = replace(fibre, source=source, path=None)
     constants = f"reference_length_m {fibre.reference_length_m:g}, f0_n {fibre.f0_n:g}"
-    faults = [f"{c.label} {c.outward(float(z)):.4g}" for c, z in _faults(fitted)]
+    moved = zip(fitted.problem.coordinates, fitted.best.z.tolist(), strict=True)
+    faults = [f"{c.label} {c.outward(z):.4g}" for c, z in moved if c.group is not None]
     comments = [
         f"Fibre {fibre.name}, model {fibre.model}, method {fibre.method}; everything on the fit is in {data['json']}.",
         f"Trials fitted: {', '.join(training)}.",
@@ -227,8 +221,3 @@ def write_fitted(path: Path, fitted: Fitted, found: Mapping[str, Any]) -> Fibre:
     # Validate what a user will load, with its own parameters compiled.
     Muscle(fibre)
     return fibre
-
-
-def _faults(fitted: Fitted) -> list[tuple[Coordinate, float]]:
-    pairs = zip(fitted.problem.coordinates, fitted.best.z.tolist(), strict=True)
-    return [(c, z) for c, z in pairs if c.group is not None]

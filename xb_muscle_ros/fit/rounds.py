@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.correction import Correction
@@ -16,9 +15,8 @@ from xb_muscle_ros.fit.noise import FIRST, Scale
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.solve import Objective, Solution
 from xb_muscle_ros.fit.training import Training
+from xb_muscle_ros.trials.trial import Array
 from xb_muscle_ros.work import Options
-
-Array = npt.NDArray[np.float64]
 
 # Rounds and halvings of one round's step at most.
 _ROUNDS, _HALVINGS = 8, 6

@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.coordinates import Coordinate
-from xb_muscle_ros.fit.descents import solution_from_json, solution_to_json, start_task
+from xb_muscle_ros.fit.descents import start_task
 from xb_muscle_ros.fit.features import F0_ANCHOR
 from xb_muscle_ros.fit.methods import fast_form
 from xb_muscle_ros.fit.noise import FIRST, Scale
@@ -22,9 +21,9 @@ from xb_muscle_ros.fit.solve import Objective, Solution
 from xb_muscle_ros.fit.training import Training, finite_start
 from xb_muscle_ros.fit.uncertainty import Curvature, ProfileEnd, curvature, profile_side
 from xb_muscle_ros.progress import Progress
+from xb_muscle_ros.trials.trial import Array
 from xb_muscle_ros.work import Options, run, stream
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.work.plain import from_plain, to_plain
 
 # Spread of further starts around the first, on the moved scale; of what is linear in its prior's standard deviations.
 _SPREAD, _LINEAR_SPREAD = 0.7, 0.5
@@ -52,8 +51,6 @@ class Fitted:
     """What a fit found.
 
     Attributes:
-        problem: what was asked.
-        settings: how.
         best: the best point; its cost is in the units of `scale`.
         scale: of the differences that the fit left.
         starts: every descent, in order; None where the model had no solution at its start.
@@ -86,8 +83,6 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
     own best point (see `rounds`), and profiles are those of the corrected Gaussian form.
 
     Args:
-        problem: trials and coordinates.
-        settings: starts, seed, level.
         options: where the work is done; finished starts and profiles are kept in the journal.
 
     Raises:
@@ -130,8 +125,8 @@ def fit(problem: Problem, settings: Settings, options: Options) -> Fitted:
 def profile_task(task: Mapping[str, Any]) -> dict[str, Any]:
     """One side of one profile."""
     objective = Objective(Training(Problem.from_json(task["problem"])), Scale(*task["scale"]))
-    best, shape = solution_from_json(task["best"]), Curvature(*(np.array(row) for row in task["shape"]))
-    return profile_side(objective, best, task["index"], task["up"], shape, task["level"])._asdict()
+    best, shape = from_plain(Solution, task["best"]), from_plain(Curvature, task["shape"])
+    return to_plain(profile_side(objective, best, task["index"], task["up"], shape, task["level"]))
 
 
 def _starts(problem: Problem, settings: Settings) -> list[Array]:
@@ -165,7 +160,7 @@ def _descended(tasks: Sequence[Mapping[str, Any]], options: Options) -> tuple[li
         if "lost" in row:
             lost[index] = row["lost"]
             continue
-        found[index] = solution = solution_from_json(row)
+        found[index] = solution = from_plain(Solution, row)
         if solution.cost < best:
             best = solution.cost
             if not options.quiet:
@@ -181,10 +176,10 @@ def _profiles(
 ) -> tuple[dict[int, tuple[ProfileEnd, ProfileEnd]], Array | None]:
     """Both sides of every model parameter's profile, or a better point that one of them met."""
     chosen = [j for j, c in enumerate(problem.coordinates) if c.group is None]
-    task = {"problem": problem.to_json(), "best": solution_to_json(best), "scale": list(scale), "level": level}
-    task["shape"] = [row.tolist() for row in shape]
+    task = {"problem": problem.to_json(), "best": to_plain(best), "scale": list(scale), "level": level}
+    task["shape"] = to_plain(shape)
     tasks = [{**task, "index": j, "up": up} for j in chosen for up in (False, True)]
     rows = run(profile_task, tasks, replace(options, label="profiles"))
-    sides = [ProfileEnd(r["end"], r["ended_by"], [(x, y) for x, y in r["points"]], r["better"]) for r in rows]
+    sides = [from_plain(ProfileEnd, row) for row in rows]
     better = next((np.array(side.better) for side in sides if side.better is not None), None)
     return {j: (sides[2 * k], sides[2 * k + 1]) for k, j in enumerate(chosen)}, better

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import scipy.optimize
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.noise import Scale
 from xb_muscle_ros.fit.training import Training
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # A point where the model has no solution counts as this far from the data, in F0 at every sample and in SD
 # at every feature.
@@ -43,7 +41,6 @@ class Objective:
     """Squared differences between model and training data, in standard deviations, and the prior's.
 
     Attributes:
-        training: the data.
         scale: how large a difference is one standard deviation.
     """
 
@@ -83,9 +80,7 @@ def descend(
     Trust-region least squares (SciPy's ``trf``) with slopes by differences.
 
     Args:
-        objective: what to make small.
         z: where to start; a coordinate that is held keeps its value.
-        held: index of the coordinate to hold.
         most: points to try at most.
         tolerance: relative change of the cost at which to stop.
     """

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from xb_muscle_ros.fit.ends import PRIOR, closes
+from xb_muscle_ros.fit.ends import DATA, PRIOR
 from xb_muscle_ros.fit.ordinary import fitted_line, unit_of
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS, Scope
 from xb_muscle_ros.tables import aligned, number
@@ -68,7 +68,7 @@ def _both(before: float | None, after: float | None) -> str:
 def _end(row: Mapping[str, Any], side: int) -> str:
     """One end of an interval: ``<`` or ``>`` where it is open, ``~`` before one that the prior makes."""
     what = row["interval_ended_by"][side]
-    mark = "" if closes(what) else "~" if what == PRIOR else "<>"[side]
+    mark = "" if what == DATA else "~" if what == PRIOR else "<>"[side]
     return f"{mark}{row['interval'][side]:.4g}"
 
 

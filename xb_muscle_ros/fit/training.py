@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit import features
@@ -14,8 +13,7 @@ from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.fit.problem import Problem, moves_simulation, touches
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS
 from xb_muscle_ros.models.muscle import Muscle
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Step of the slopes on the moved scale, against errors of the steps of 1e-6: wrong by some 1e-4.
 _STEP = 1e-4

@@ -20,8 +20,7 @@ from xb_muscle_ros.fit.ends import BOUND, UNSETTLED, of_parameters, profile_end
 from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.fit.noise import noise_at
 from xb_muscle_ros.fit.solve import Objective, Solution, descend
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Points on one side of a profile at most; the search converges on the root of the likelihood ratio in four or five.
 _POINTS = 9
@@ -82,16 +81,7 @@ class ProfileEnd(NamedTuple):
 def profile_side(
     objective: Objective, best: Solution, index: int, up: bool, shape: Curvature, level: float = 0.95
 ) -> ProfileEnd:
-    """Follow one coordinate from the best point, all others moving along, to where the likelihood ratio ends it.
-
-    Args:
-        objective: of the fit.
-        best: its best point.
-        index: of the coordinate.
-        up: upward or downward.
-        shape: see `curvature`.
-        level: of the interval.
-    """
+    """Follow one coordinate from the best point, all others moving along, to where the likelihood ratio ends it."""
     lower, upper = objective.training.problem.bounds
     bound = float(upper[index] if up else lower[index])
     wanted = float(np.sqrt(chi2.ppf(level, 1)))

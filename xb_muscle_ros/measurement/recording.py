@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 from numba import njit
 
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 
 def given_calcium(calcium_um: Array, artefacts: Mapping[str, float]) -> Array:

@@ -113,10 +113,6 @@ def rates(model: Composition, q: Quantities) -> Parts:
         unit = Unit(chain.force, chain.force_rate, chain.stiffness)
     for extra in model.extras:
         unit = _with_inner(unit, extra, q.for_block(extra.name))
-    if any(extra.limits_force for extra in model.extras):
-        # Close to where a falling limb ends the share falls faster than heads are stiff. Alone they would give way
-        # without end; the series element, which is held to the same force, then settles how fast.
-        unit = unit._replace(stiffness=ops.positive(unit.stiffness))
     q = q.for_block(
         model.series.name, force_xb=unit.force, kinetic_force_rate=unit.force_rate, stiffness_xb=unit.stiffness
     )
@@ -134,10 +130,12 @@ def rates(model: Composition, q: Quantities) -> Parts:
 
 def _shared(model: Composition, unit: Unit, q: Quantities) -> Unit:
     """What of the heads' force is borne at a length: by the product rule the share's slope is a stiffness too."""
-    for extra in model.extras:
+    for extra in (extra for extra in model.extras if extra.limits_force):
         share, slope = extra.force_share(q.for_block(extra.name))
         stiffness = share * unit.stiffness + slope * unit.force / q.gamma
-        unit = Unit(share * unit.force, share * unit.force_rate, stiffness)
+        # At the very end of a falling limb, with a thousandth of the force left, the share falls faster than heads are
+        # stiff, and a soft enough spring would have them give way without end: there they count as not stiff.
+        unit = Unit(share * unit.force, share * unit.force_rate, ops.positive(stiffness))
     return unit
 
 

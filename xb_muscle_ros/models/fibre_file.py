@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ import yaml
 
 from xb_muscle_ros import fast_yaml
 from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.files import installed_folders
 from xb_muscle_ros.models.catalogue import starts_for, swapped_in
 from xb_muscle_ros.models.parameters import CONSTANTS, PARAMETERS, checked, complete
 from xb_muscle_ros.models.registry import METHODS, SEPARATOR, base_of, compose, model_of_set, split_set
@@ -52,13 +52,7 @@ class Fibre:
 
 def fibre_folders() -> Iterator[Path]:
     """Folders where fibre files are looked for: the source tree, then the installed share folders."""
-    here = Path(__file__).resolve()
-    yield here.parents[2] / "config" / "fibers"
-    # With colcon and with pip alike, share/ lies beside the lib/ that holds this package.
-    for parent in here.parents:
-        if parent.name in ("lib", "local"):
-            yield parent.parent / "share" / "xb_muscle_ros" / "config" / "fibers"
-    yield Path(sys.prefix) / "share" / "xb_muscle_ros" / "config" / "fibers"
+    return installed_folders("config", "fibers")
 
 
 def find_fibre_file(name_or_path: str | Path) -> Path:

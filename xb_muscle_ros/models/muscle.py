@@ -146,8 +146,8 @@ class Muscle:
         """
         if self._settling.step_s is not None or self.fibre.values["smoothing"] > 0.0:
             return None
-        # A step that is a tiny share of what is to come counts as stuck, so the first second goes by itself, and if need
-        # be the first millisecond (passive force, hardly a head). What a long step leaves of an error goes in one more.
+        # A step that is a tiny share of what is to come counts as stuck, so the first second goes by itself, if need be
+        # the first millisecond too (passive force, hardly a head). What a long step leaves of an error one more takes.
         steps = ((1.0, 1e-6), (_LONGEST_SETTLING_S, 0.1), (_LONGEST_SETTLING_S, _LONGEST_SETTLING_S))
         for durations in (steps, ((1e-3, 1e-6), *steps)):
             found = state

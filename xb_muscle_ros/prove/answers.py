@@ -14,8 +14,7 @@ from xb_muscle_ros.work import JsonValue
 NO_DIAGNOSIS = "error"
 """Verdict of a case that the tool could not do."""
 FAMILIES_OF_PHYSICS = tuple(dict.fromkeys(FAMILY[name] for name in MECHANISMS))
-_PHYSICS = {*(name.value for name in MECHANISMS), *FAMILIES_OF_PHYSICS}
-_FAMILY: Mapping[str, str] = {name.value: family for name, family in FAMILY.items()}
+_PHYSICS = {*MECHANISMS, *FAMILIES_OF_PHYSICS}
 
 
 class Statement(NamedTuple):
@@ -23,7 +22,6 @@ class Statement(NamedTuple):
 
     Attributes:
         name: of a mechanism or artefact, or of a family whose members are not separable.
-        family: whose it is.
         single: whether it is one name, and not a family of several.
         probability: that it is part of the truth; None in format 1, which has none for it.
     """
@@ -46,7 +44,6 @@ class Answer:
         confidence: of format 1.
         first_mismatch: trial and phase; None without mismatch.
         before_heldout_f0, after_heldout_f0: held-out RMSD of base and answer, F0; None where nothing was held out.
-        seconds: that the tool took.
     """
 
     verdict: str
@@ -135,4 +132,4 @@ def _statement(row: Mapping[str, Any]) -> Statement:
 
 def _bare(name: str) -> Statement:
     """A name that stands alone; one that is neither mechanism nor artefact is taken for a family's."""
-    return Statement(name, _FAMILY.get(name, name), name in _FAMILY, None)
+    return Statement(name, FAMILY.get(name, name), name in FAMILY, None)

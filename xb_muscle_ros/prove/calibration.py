@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.prove.counting import Score, share
 from xb_muscle_ros.prove.judging import JudgedComposite, JudgedName
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 BINS = 10
 """Bins of equal width; a bin has its lower edge, the last its upper edge as well."""
@@ -27,9 +26,6 @@ class Stated(NamedTuple):
 
 def error(cases: Sequence[Sequence[Stated]]) -> float | None:
     """Expected calibration error: mean over all statements of |mean probability - share right| of their bins.
-
-    Args:
-        cases: the statements of every case.
 
     Returns:
         None where there is no statement.

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from scipy.stats import binomtest
 
-from xb_muscle_ros.diagnose.names import FAMILY, Name
+from xb_muscle_ros.diagnose.names import FAMILY
 from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.prove.answers import NO_DIAGNOSIS
 from xb_muscle_ros.prove.judging import Judged, JudgedComposite, JudgedEffect, JudgedName, JudgedSingle
@@ -26,10 +26,7 @@ class Score(NamedTuple):
     """A share of cases, or a mean.
 
     Attributes:
-        name: fixed.
-        meaning: in words.
         value: None where no case counts.
-        n: cases that count.
         lower, upper: 95 % interval: Clopper–Pearson for shares, bootstrap for medians.
         bar: to reach; None where it has none.
         at_most: the bar is an upper one.
@@ -185,7 +182,7 @@ def of_composites(judged: Sequence[JudgedComposite], calibration: Sequence[Score
         share(
             "artefact_found", "artefacts beyond the ordinary: family named",
             (
-                FAMILY[Name(label)] in {name.family for name in j.artefacts_named}
+                FAMILY[label] in {name.family for name in j.artefacts_named}
                 for j in of["artefact"] for label in j.artefacts
             ),
         ),

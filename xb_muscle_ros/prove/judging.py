@@ -8,15 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 from xb_muscle_ros.diagnose.names import FAMILY, Name
 from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.prove.answers import Answer, Statement
 
 # A global change of rates is what parameters are for: to call it so is right as well.
-_AS_GOOD_AS_PARAMETERS = {Name.TEMPERATURE.value, Name.PHOSPHATE.value}
-_NAMES = frozenset(name.value for name in FAMILY)
+_AS_GOOD_AS_PARAMETERS = {Name.TEMPERATURE, Name.PHOSPHATE}
 
 
 @dataclass(frozen=True)
@@ -29,7 +28,6 @@ class Judged:
         physics: whether the tool says that physics is missing.
         gain: held-out gain over that of the true model; None unless before and after are known.
         worse: whether the answer predicts held-out conditions worse than the base; None where that is unknown.
-        seconds: that the tool took.
     """
 
     case: str
@@ -50,12 +48,10 @@ class JudgedSingle(Judged):
     """What became of a case with one effect, a pair or none.
 
     Attributes:
-        labels: what is concealed.
         size_f0: RMS that it leaves after a refit.
         size_class_f0: the highest of 0.5, 1, 2 and 4 % F0 that this reaches, else 0; None for nulls and artefacts.
         answer: first name that the tool gives, else its verdict.
         exact: the first name is right; for a pair either, for temperature and phosphate also ``parameters``, ``none``.
-        family: the first name is of a right family.
         located: the first mismatch is where the residual of a refit is at least half as large as anywhere; None
             without mismatch.
         located_beside_nuisances: the same with a refit of constants and nuisance parameters.
@@ -73,16 +69,9 @@ class JudgedSingle(Judged):
     confidence: float | None
 
 
-class JudgedEffect(NamedTuple):
-    """What became of a mechanism that is concealed.
-
-    Attributes:
-        label: its name.
-        family: its family.
-        size_f0: its unique contribution, F0.
-        family_found: a name of its family is in the answer.
-        exact_found: its name is.
-    """
+@dataclass(frozen=True)
+class JudgedEffect:
+    """What became of a mechanism that is concealed: of its unique contribution, F0, and whether the answer has it."""
 
     label: str
     family: str
@@ -91,14 +80,9 @@ class JudgedEffect(NamedTuple):
     exact_found: bool
 
 
-class JudgedName(NamedTuple):
-    """A name that was given, or a component with its probability.
-
-    Attributes:
-        name, family, single, probability: as stated, see `Statement`.
-        family_right: an effect of this family is there.
-        exact_right: the effect itself is.
-    """
+@dataclass(frozen=True)
+class JudgedName:
+    """A name or a component as stated (see `Statement`), and whether an effect of its family, and itself, is there."""
 
     name: str
     family: str
@@ -113,14 +97,9 @@ class JudgedComposite(Judged):
     """What became of a composite.
 
     Attributes:
-        trials: of its study.
-        effects: mechanisms that are concealed.
-        outside: effects without a name that are.
-        artefacts: of the measurement.
-        named: mechanisms of the answer.
-        artefacts_named: artefacts that the tool names.
-        statements: all mechanisms that it gives a probability.
-        artefact_statements: all such artefacts.
+        effects, outside, artefacts: what is concealed: mechanisms, effects without a name, errors of the measurement.
+        named, artefacts_named: mechanisms of the answer, and artefacts that the tool names.
+        statements, artefact_statements: all of either that it gives a probability.
     """
 
     trials: int
@@ -136,7 +115,7 @@ class JudgedComposite(Judged):
 def judge(truth: Mapping[str, Any], found: Answer) -> JudgedSingle:
     """Hold a diagnosis against the truth of a case of singles."""
     labels, first = tuple(truth["labels"]), found.first
-    families = {FAMILY[Name(label)] for label in labels if label in _NAMES}
+    families = {FAMILY[label] for label in labels if label in FAMILY}
     silent = (Verdict.PARAMETERS.value, Verdict.NONE.value)
     as_good = bool(set(labels) & _AS_GOOD_AS_PARAMETERS) and found.verdict in silent
     speaks = found.verdict in (Verdict.PHYSICS.value, Verdict.MEASUREMENT.value, Verdict.AMBIGUOUS.value)
@@ -160,7 +139,7 @@ def judge_composite(truth: Mapping[str, Any], found: Answer) -> JudgedComposite:
     """Hold a diagnosis against the truth of a composite; one that failed says nothing."""
     effects = [effect for effect in truth["effects"] if effect["family"] is not None]
     mechanisms = {str(effect["label"]): str(effect["family"]) for effect in effects}
-    artefacts = {str(name): FAMILY[Name(name)] for name in truth["artefacts"]}
+    artefacts = {str(name): FAMILY[name] for name in truth["artefacts"]}
     named = _judged(found.named_mechanisms, mechanisms)
     families, names = {name.family for name in named}, {name.name for name in named if name.exact_right}
     return JudgedComposite(

@@ -24,13 +24,13 @@ from xb_muscle_ros.trials.bag_files import remove_results
 from xb_muscle_ros.work import JsonValue, Options, stream
 
 _STUDIES = "Studies of made fibres, each with its bags and a fibre file that was fitted to another fibre"
-_SEALED = "The key was sealed when the cases were made: its SHA-256 is below."
+SEALED = "The key was sealed when the cases were made: its SHA-256 is below."
 _ABOUT = {
     SINGLES: f"{_STUDIES}. In some something is concealed: a mechanism, an effect that has no name, or a measurement "
-    f"artefact; in some nothing. {_SEALED}",
+    f"artefact; in some nothing. {SEALED}",
     COMPOSITES: f"{_STUDIES}, all recorded with ordinary measurement artefacts. In most something is concealed: one "
     "mechanism or several, an effect that has no name, or measurement artefacts beyond the ordinary; in some "
-    f"nothing. {_SEALED}",
+    f"nothing. {SEALED}",
 }
 
 
@@ -47,13 +47,11 @@ def make(
 
     Args:
         out: folder; gets ``cases/`` and ``benchmark.json``.
-        cases: how many.
         seed: decides everything; who knows it knows the key.
         key: file for the truths; must not lie in `out`.
         method: how the fibre files say that heads are distributed over strain.
         options: where to work; the journal is kept beside the key until all is done.
         overwrite: replace another benchmark and its key.
-        kind: one of `sealing.KINDS`.
 
     Returns:
         SHA-256 of the key file.

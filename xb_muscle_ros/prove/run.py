@@ -25,11 +25,7 @@ def run(folder: Path, out: Path, quick: bool, seed: int, options: Options, overw
     """Diagnose all cases; a run that was stopped goes on where it was.
 
     Args:
-        folder: of the benchmark.
         out: gets one folder of a diagnosis for each case, ``results.json`` and a copy of ``benchmark.json``.
-        quick: the tool's quick way.
-        seed: of the tool.
-        options: where to work.
         overwrite: replace the results of an older run; diagnoses that the journal keeps are not done again.
 
     Returns:
@@ -76,20 +72,17 @@ def _task(folder: Path, out: Path, name: str, quick: bool, seed: int) -> dict[st
 
 def _diagnose(task: Mapping[str, Any]) -> dict[str, JsonValue]:
     """Diagnose one case; a case that the tool cannot do is a result as well."""
-    from xb_muscle_ros.diagnose.run import diagnose_bags
-    from xb_muscle_ros.trials.bags import find_bags
+    from xb_muscle_ros.diagnose.intake import read_fibres
+    from xb_muscle_ros.diagnose.outputs import write
+    from xb_muscle_ros.diagnose.run import diagnose
 
-    folder = Path(task["folder"])
+    folder, out = Path(task["folder"]), Path(task["out"])
+    options = Options(processes=0, quiet=True, journal=out / "journal.jsonl")
     start = time.perf_counter()
     try:
-        found = diagnose_bags(
-            find_bags([folder / "bags"]),
-            folder / "fibre.yaml",
-            Path(task["out"]),
-            bool(task["quick"]),
-            int(task["seed"]),
-            report=False,
-        )
+        studies = read_fibres([folder / "bags"], [folder / "fibre.yaml"])
+        found, files = diagnose(studies, bool(task["quick"]), int(task["seed"]), options)
+        write(out, found, files, report=False)
     except UserError as error:
         return {"error": str(error), "seconds": time.perf_counter() - start}
     return {**row_of(found), "seconds": time.perf_counter() - start}

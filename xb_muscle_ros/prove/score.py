@@ -16,7 +16,7 @@ from xb_muscle_ros.prove import calibration
 from xb_muscle_ros.prove.answers import Answer
 from xb_muscle_ros.prove.calibration import Stated, as_stated, reliability
 from xb_muscle_ros.prove.counting import Score, by_size, of_composites, of_singles
-from xb_muscle_ros.prove.judging import Judged, JudgedEffect, JudgedName, JudgedSingle, judge, judge_composite
+from xb_muscle_ros.prove.judging import JudgedEffect, JudgedSingle, judge, judge_composite
 from xb_muscle_ros.prove.run import RESULTS
 from xb_muscle_ros.prove.score_figures import draw_composites, draw_singles
 from xb_muscle_ros.prove.sealing import COMPOSITES, SINGLES, kind_of, load_benchmark, open_key
@@ -34,7 +34,6 @@ def score(results: Path, key: Path, out: Path, overwrite: bool = False) -> tuple
         results: folder with ``results.json`` and ``benchmark.json``.
         key: its hash must be the one of ``benchmark.json``.
         out: gets ``scores.json``, ``scores.md`` and figures.
-        overwrite: replace older scores.
 
     Returns:
         The table in words, and the files.
@@ -75,14 +74,7 @@ Clopper–Pearson; of calibration errors: bootstrap over cases.
 
 
 class Summary(NamedTuple):
-    """What is reported of a benchmark.
-
-    Attributes:
-        scores: those with a bar first.
-        tree: what ``scores.json`` holds besides.
-        section: what ``scores.md`` holds besides.
-        draw: draws figures into a folder and returns their paths.
-    """
+    """What is reported of a benchmark: scores, and what ``scores.json``, ``scores.md`` and figures hold besides."""
 
     scores: list[Score]
     tree: dict[str, Any]
@@ -100,7 +92,7 @@ def _of_singles(truths: Sequence[Mapping[str, Any]], found: Mapping[str, Answer]
     stated = [Stated(j.confidence, j.exact) for j in judged if j.confidence is not None and j.answer != j.verdict]
     bins = reliability([stated], _CONFIDENCE_BINS)
     brier = float(np.mean([(s.probability - s.right) ** 2 for s in stated])) if stated else None
-    tree = {"by_size": sizes, "calibration": {"n": len(stated), "brier": brier, "bins": bins}, "judged": _rows(judged)}
+    tree = {"by_size": sizes, "calibration": {"n": len(stated), "brier": brier, "bins": bins}, "judged": judged}
     heads = {"family": "family first", "exact": "mechanism first", "physics": "verdict physics"}
     section = _sizes("Single effects", sizes, heads) + _SINGLE_SIZE
     return Summary(of_singles(judged), tree, section, lambda folder: draw_singles(folder, judged, sizes, bins))
@@ -119,21 +111,12 @@ def _of_composites(truths: Sequence[Mapping[str, Any]], found: Mapping[str, Answ
         if error.value is not None
         else ""
     )
-    tree = {"by_size": sizes, "calibration": bins, "judged": _rows(judged)}
+    tree = {"by_size": sizes, "calibration": bins, "judged": judged}
     section = _sizes("Effects", sizes, {"family": "family in the answer", "exact": "name in the answer"})
     return Summary(
         of_composites(judged, errors), tree, section + _COMPOSITE_SIZE,
         lambda folder: draw_composites(folder, judged, sizes, bins, words),
     )  # fmt: skip
-
-
-def _rows(judged: Sequence[Judged]) -> list[dict[str, Any]]:
-    """As JSON can hold them."""
-    return [{k: [_plain(v) for v in of] if isinstance(of, tuple) else of for k, of in vars(j).items()} for j in judged]
-
-
-def _plain(row: Any) -> Any:
-    return row._asdict() if isinstance(row, (JudgedEffect, JudgedName)) else row
 
 
 _SUMMARIES: Mapping[str, Callable[[Sequence[Mapping[str, Any]], Mapping[str, Answer]], Summary]] = {

@@ -7,20 +7,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.names import FAMILY, MECHANISMS, Name
+from xb_muscle_ros.diagnose.names import FAMILY, MECHANISMS
 from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure, save
 from xb_muscle_ros.prove.answers import FAMILIES_OF_PHYSICS
 from xb_muscle_ros.prove.counting import LARGE_F0
 from xb_muscle_ros.prove.judging import JudgedComposite, JudgedSingle
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 _FAMILIES = list(dict.fromkeys(FAMILY.values()))
 # Families side by side, artefacts behind.
-_NAMES = [n.value for n in sorted(FAMILY, key=lambda n: (n not in MECHANISMS, _FAMILIES.index(FAMILY[n])))]
+_NAMES = sorted(FAMILY, key=lambda n: (n not in MECHANISMS, _FAMILIES.index(FAMILY[n])))
 _TRUTHS = (*_NAMES, "outside", "null")
 _ANSWERS = (*_NAMES, Verdict.UNEXPLAINED.value, Verdict.PARAMETERS.value, Verdict.NONE.value, "other")
 _WORDS = {"null": "nothing", "outside": "outside the library"}
@@ -38,7 +36,7 @@ def draw_singles(folder: Path, judged: Sequence[JudgedSingle], sizes: Sequence[A
     # Squares of families need the same names both ways.
     used = counts[: len(_NAMES)].any(axis=1) | counts[:, : len(_NAMES)].any(axis=0)
     kept = [name for name, there in zip(_NAMES, used, strict=True) if there]
-    edges = [sum(Name(name) in MECHANISMS for name in kept), len(kept)]
+    edges = [sum(name in MECHANISMS for name in kept), len(kept)]
     for name, axis, whose in (("confusion", 1, "truth"), ("inversion", 0, "answer")):
         path, words = folder / f"{name}.png", (f"Share of the {whose}'s cases", "Answered first")
         made.append(_matrix(path, counts, (_TRUTHS, _ANSWERS), kept, axis, words, edges, True))
@@ -157,7 +155,7 @@ def _matrix(
                 color="white" if shares[i, k] > 0.55 else "black",
             )  # fmt: skip
         if framed:
-            _frames(axes, [FAMILY[Name(name)] for name in kept])
+            _frames(axes, [FAMILY[name] for name in kept])
         for edge in {*edges}:
             axes.axhline(edge - 0.5, color=DATA, linewidth=0.7)
             axes.axvline(edge - 0.5, color=DATA, linewidth=0.7)

@@ -9,12 +9,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from xb_muscle_ros.diagnose.report.codec import renamed
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import matching
 
 BENCHMARK = "benchmark.json"
 VERSION = 3
 """Of keys and public descriptions; former keys are read."""
+# Keys of the versions before 3.
+_RENAMED = {
+    "faults": "artefact_sizes", "ordinary": "ordinary_artefact_sizes", "artefacts_left_f0": "artefact_residual_f0",
+    "artefacts_left_sd": "artefact_prior_residual_sd", "beside_rest_f0": "unique_contribution_f0",
+}  # fmt: skip
 SINGLES, COMPOSITES = KINDS = ("singles", "composites")
 """Kinds of benchmark: at most one thing or a pair is concealed; or several, on top of ordinary artefacts."""
 
@@ -80,21 +86,8 @@ def open_key(key: Path, benchmark: dict[str, Any]) -> dict[str, Any]:
             "give the key that was made with it"
         )
     content: dict[str, Any] = json.loads(key.read_text(encoding="utf-8"))
-    return content if content["version"] >= VERSION else dict(_renamed(content))
-
-
-# Keys of the versions before 3, and the kind of their cases with an artefact.
-_RENAMED = {
-    "faults": "artefact_sizes", "ordinary": "ordinary_artefact_sizes", "artefacts_left_f0": "artefact_residual_f0",
-    "artefacts_left_sd": "artefact_prior_residual_sd", "beside_rest_f0": "unique_contribution_f0",
-}  # fmt: skip
-
-
-def _renamed(value: Any) -> Any:
-    """What a former key holds, under today's names."""
-    if isinstance(value, list):
-        return [_renamed(one) for one in value]
-    if not isinstance(value, dict):
-        return value
-    row = {_RENAMED.get(name, name): _renamed(one) for name, one in value.items()}
-    return {**row, "kind": "artefact"} if row.get("kind") == "fault" else row
+    if content["version"] < VERSION:
+        content = renamed(content, _RENAMED)
+        for case in content["cases"]:
+            case["kind"] = "artefact" if case["kind"] == "fault" else case["kind"]
+    return content

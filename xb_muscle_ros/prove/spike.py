@@ -20,15 +20,12 @@ from xb_muscle_ros.prove.generator.refit import Refit
 from xb_muscle_ros.prove.generator.single import conceal, facts
 from xb_muscle_ros.prove.generator.study import Planned
 from xb_muscle_ros.prove.generator.world import MODELS, SAMPLE_S, World
-from xb_muscle_ros.prove.make import case_name, make_room, seal
+from xb_muscle_ros.prove.make import SEALED, case_name, make_room, seal
 from xb_muscle_ros.trials.bags import find_bags, read_trial, write_trial
 from xb_muscle_ros.trials.trial import Trial
 from xb_muscle_ros.work import JsonValue, Options, stream
 
-_ABOUT = (
-    "Real recordings; to most of them the force was added that a concealed effect would have added. "
-    "The key was sealed when the cases were made: its SHA-256 is below."
-)
+_ABOUT = f"Real recordings; to most of them the force was added that a concealed effect would have added. {SEALED}"
 
 
 def spike(
@@ -46,12 +43,7 @@ def spike(
     Args:
         bags: trials of one fibre, with measured force and constant calcium.
         fiber: file with the set of the fibre around which the effects are computed; goes with every case.
-        out: folder of the benchmark.
-        cases: how many.
-        seed: decides everything.
-        key: file for the truths.
-        options: where to work.
-        overwrite: replace another benchmark and its key.
+        out, cases, seed, key, options, overwrite: see `make.make`.
 
     Returns:
         SHA-256 of the key.

@@ -34,7 +34,6 @@ def demo(recordings: Path | None, out: Path, live: bool, timing: Timing) -> int:
 
     Args:
         recordings: folder with the recordings of the rat soleus; looked for beside the source tree where None.
-        out: folder for bags, results and figure.
         live: also through a muscle_node, over DDS.
         timing: measures a realtime node: `bench.timing.run_timing`.
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, SHADE, figure, save
-from xb_muscle_ros.plotting.trial_pages import Look, pages_of, panels, size_mm
+from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, SHADE
+from xb_muscle_ros.plotting.trial_pages import Look, draw_pages
 from xb_muscle_ros.trials.simulated import Simulated
 from xb_muscle_ros.trials.trial import Trial
 
@@ -31,30 +31,16 @@ def draw_replay(
     Args:
         path: of the first page, PNG; a PDF goes beside it. Further pages are called ``<name>_2`` and so on.
         trials: with or without measured force.
-        simulated: same order.
-        label: what the model's line is called.
         live: force that came from a node, drawn as dashes on top.
 
     Returns:
         paths of the pages.
     """
-    pages = []
-    for here, chosen in pages_of(path, len(trials), _PER_PAGE):
-        _page(here, trials[chosen], simulated[chosen], label, live[chosen] if live is not None else None)
-        pages.append(here)
-    return pages
 
+    def draw(upper: Any, lower: Any, i: int) -> list[Any]:
+        return _panel(upper, lower, trials[i], simulated[i], label, None if live is None else live[i])
 
-def _page(
-    path: Path, trials: Sequence[Trial], simulated: Sequence[Simulated], label: str, live: Sequence[Simulated] | None
-) -> None:
-    with figure(*size_mm(len(trials), _LOOK)) as made:
-        handles: list[Any] = []
-        for i, (upper, lower) in enumerate(panels(made, len(trials), _LOOK)):
-            lines = _panel(upper, lower, trials[i], simulated[i], label, live[i] if live is not None else None)
-            handles = lines if len(lines) > len(handles) else handles
-        made.legend(handles=handles, loc="outside upper center", ncols=len(handles), frameon=False)
-        save(made, path)
+    return draw_pages(path, len(trials), _PER_PAGE, _LOOK, draw, 2 if live is None else 3)
 
 
 def _panel(upper: Any, lower: Any, trial: Trial, simulated: Simulated, label: str, live: Simulated | None) -> list[Any]:

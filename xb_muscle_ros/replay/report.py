@@ -38,7 +38,6 @@ class Record:
     """One trial.
 
     Attributes:
-        trial: its name.
         fibre, model, method: what it was simulated with.
         pca, amplitude_l0, recovery_s: condition; None where not known.
         rmsd_f0: of the force by window, F0; None where the trial lacks it.
@@ -94,12 +93,10 @@ def with_relative_srs(records: Sequence[Record]) -> list[Record]:
 
 
 def _relative(entry: Record, reference: Record) -> Record:
-    is_reference = entry is reference
-
-    def relative(of: Mapping[str, Estimate], below: Mapping[str, Estimate]) -> Estimate:
-        return relative_srs(of[SRS_TEST]._replace(why=""), below[SRS_TEST]._replace(why=""), is_reference)
-
-    ours, theirs = relative(entry.simulated, reference.simulated), relative(entry.measured, reference.measured)
+    ours, theirs = (
+        relative_srs(of[SRS_TEST], below[SRS_TEST], entry is reference)
+        for of, below in ((entry.simulated, reference.simulated), (entry.measured, reference.measured))
+    )
     lost = theirs.value is None and theirs.why and entry.measured[SRS_TEST].value is not None
     return replace(
         entry,

@@ -53,7 +53,6 @@ def replay(
 
     Args:
         trials: at least one, names unique.
-        fibre: parameters.
         live: plays the trials through a running node; None replays offline.
         substeps: see `simulate_trial`; offline only.
         settle_s: see `simulate_trial`; offline only.
@@ -128,8 +127,6 @@ def write_results(folder: Path, trials: Sequence[Trial], results: Replay, live: 
 
     Args:
         folder: made if need be.
-        trials: as replayed.
-        results: of the replay.
         live: a second replay of the same trials, drawn on top.
     """
     from xb_muscle_ros.models.titles import title_of

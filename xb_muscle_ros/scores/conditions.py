@@ -1,4 +1,4 @@
-"""The 84 conditions that every fibre was tested in, and the sets of them that scores are taken over."""
+"""The 84 conditions that every fibre was tested in: activation classes, what was done before, and sets of both."""
 
 from __future__ import annotations
 
@@ -7,7 +7,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.scores.activation import CLASSES
+from xb_muscle_ros.trials.trial import Array
+
+# How hard a fibre works at a pCa, by its isometric force.
+CLASSES = ("passive", "low", "intermediate", "high")
+BOUNDS_F0 = (0.05, 0.30, 0.70)
+UNKNOWN = -1
 
 AMPLITUDES_L0 = (0.0012, 0.0038, 0.0121, 0.0383)
 RECOVERIES_S = (0.001, 0.1, 0.316, 1.0, 10.0)
@@ -17,6 +22,21 @@ LARGE_ABOVE_L0 = 0.03
 LARGE_BELOW_S = 0.5
 
 Mask = npt.NDArray[np.bool_]
+
+
+def activation_class(isometric_f0: Array) -> npt.NDArray[np.int64]:
+    """Index into `CLASSES` for each isometric force, `UNKNOWN` where the force is not known.
+
+    Passive below 5 %, low from 5 to below 30 %, intermediate from 30 to 70 %, high above 70 % of F0
+    (van der Zee et al. 2026).
+
+    Args:
+        isometric_f0: any shape, F0; NaN where not measured.
+    """
+    force = np.asarray(isometric_f0, dtype=np.float64)
+    low, middle, high = BOUNDS_F0
+    level = (force >= low).astype(np.int64) + (force >= middle) + (force > high)
+    return np.where(np.isfinite(force), level, UNKNOWN)
 
 
 class Condition(NamedTuple):

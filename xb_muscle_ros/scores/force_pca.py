@@ -39,8 +39,7 @@ class ForcePca(NamedTuple):
 
 def hill_curve(pca: Array, pca50: float, n_hill: float, passive_f0: float, maximal_f0: float) -> Array:
     """Hill's equation (F0) at pCa values, shape (n,)."""
-    curve: Array = passive_f0 + (maximal_f0 - passive_f0) / (1.0 + 10.0 ** (n_hill * (pca - pca50)))
-    return curve
+    return passive_f0 + (maximal_f0 - passive_f0) / (1.0 + 10.0 ** (n_hill * (pca - pca50)))
 
 
 def fit_force_pca(pca: Array, force_f0: Array) -> ForcePca | Missing:

@@ -83,5 +83,10 @@ def _level(pca: float | None) -> str:
 
 
 def relative_srs(test: Estimate, reference: Estimate, is_reference: bool) -> Estimate:
-    """SRS of a test stretch over that of the reference trial; the reference itself has 1, without error."""
-    return Estimate(1.0) if is_reference and test.value else quotient(test, reference)
+    """SRS of a test stretch over that of the reference trial; the reference itself has 1, without error.
+
+    Why either SRS is missing is said of itself, and not once more here.
+    """
+    if is_reference and test.value:
+        return Estimate(1.0)
+    return quotient(test._replace(why=""), reference._replace(why=""))

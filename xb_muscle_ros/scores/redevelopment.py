@@ -9,7 +9,7 @@ from scipy.optimize import curve_fit
 
 from xb_muscle_ros.scores.estimate import Estimate, Missing
 from xb_muscle_ros.scores.noise.hum import hum
-from xb_muscle_ros.scores.noise.pieces import Piece, steps_evenly
+from xb_muscle_ros.scores.noise.pieces import Piece, evenly_sampled
 from xb_muscle_ros.scores.noise.trials import by_curves
 from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.trial import Array, Trial
@@ -93,7 +93,6 @@ def redevelopment_rate(trial: Trial, time_s: Array, force_f0: Array, noise: Forc
     """k_tr (1/s) of a trial's force; no value, of which nothing is said, where it is not released and restretched.
 
     Args:
-        trial: lengths and calcium.
         time_s, force_f0, noise: see `redevelopment`.
     """
     restretched = restretch_end(trial.time_s, trial.length_change_l0)
@@ -147,7 +146,7 @@ def redevelopment(
     step_s = float(np.mean(np.diff(t)))
     lines, rest = hum(step_s, residual)
     curve, _ = np.linalg.qr(_slopes(since, *found))
-    beside = by_curves({"": [Piece(t, rest, curve)]}, {"": steps_evenly(t)})
+    beside = by_curves({"": [Piece(t, rest, curve)]}, {"": evenly_sampled(t)})
     se = ForceNoise(beside[""], step_s, lines).of_sum(weights, t)
     if noise is not None:
         se = max(se, noise.of_sum(weights, t))

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.scores.activation import CLASSES
+from xb_muscle_ros.scores.conditions import CLASSES
 from xb_muscle_ros.trials.trial import Array
 
 AVERAGINGS = ("mean", "mean_of_trials", "median", "ratio_of_means")

@@ -81,5 +81,4 @@ def short_windows(trial: Trial) -> dict[str, str]:
 
 def _inside(time_s: Array, window: tuple[float, float]) -> npt.NDArray[np.bool_]:
     # Half a nanosecond of grace: phases are computed, stamps are whole nanoseconds.
-    inside: npt.NDArray[np.bool_] = (time_s >= window[0] - 5e-10) & (time_s <= window[1] + 5e-10)
-    return inside
+    return (time_s >= window[0] - 5e-10) & (time_s <= window[1] + 5e-10)

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import matmul_toeplitz
 
 from xb_muscle_ros.errors import UserError
@@ -22,9 +21,7 @@ from xb_muscle_ros.scores.noise.model import Source, TrialNoise
 from xb_muscle_ros.scores.noise.pieces import evenly_sampled
 from xb_muscle_ros.scores.noise.trials import ENOUGH, by_windows, noise_of, steady_scatter_f0
 from xb_muscle_ros.scores.noise.windows import LEAST, isometric_window
-from xb_muscle_ros.trials.trial import Trial
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array, Trial
 
 
 class ForceNoise:
@@ -59,8 +56,7 @@ class ForceNoise:
             time_s: of the samples, shape (n,), s.
         """
         found = weights.T @ matmul_toeplitz(self.autocovariance(time_s), weights)
-        symmetric: Array = 0.5 * (found + found.T)
-        return symmetric
+        return 0.5 * (found + found.T)
 
     def of_sum(self, weights: Array, time_s: Array) -> float:
         """Standard error of one weighted sum of samples, weights of shape (n,)."""
@@ -76,7 +72,7 @@ def force_noise(trial: Trial) -> ForceNoise | None:
     if trial.force_time_s.size < 2:
         return None
     name, step_s = trial.facts.trial, float(np.median(np.diff(trial.force_time_s)))
-    if evenly_sampled(trial):
+    if evenly_sampled(trial.force_time_s):
         window = isometric_window(trial)
         if window.force_f0.size >= LEAST:
             # In fewer samples a line is no sharper than an autoregression.

@@ -50,9 +50,9 @@ def paired_t(first: Sequence[float], second: Sequence[float]) -> Paired:
     return Paired(n, difference, sd, float(result.statistic), float(result.pvalue))
 
 
-def bonferroni_threshold(comparisons: int, alpha: float = ALPHA) -> float:
+def bonferroni_threshold(comparisons: int) -> float:
     """Largest p that is significant when so many comparisons are made: 0.05/15 = 0.0033 in van der Zee et al. 2026."""
-    return alpha / max(1, comparisons)
+    return ALPHA / max(1, comparisons)
 
 
 def aic(residual_sum_of_squares: float, observations: int, fitted_parameters: int) -> float | None:

@@ -47,7 +47,6 @@ def steady_part(trial: Trial, time_s: Array, force_f0: Array) -> Steady:
     """The steady isometric part that a trial begins with.
 
     Args:
-        trial: its phases and calcium.
         time_s, force_f0: shape (n,), force, measured or simulated, s and F0.
     """
     phases = trial.facts.phases

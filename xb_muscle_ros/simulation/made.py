@@ -23,15 +23,12 @@ def coloured_noise(
     """First-order autoregressive noise.
 
     Args:
-        random: where it comes from.
-        n: samples.
         sd: standard deviation, F0.
         autocorrelation: correlation of one sample with the next, 0 up to below 1.
     """
     innovations = random.normal(size=n) * sd * np.sqrt(1.0 - autocorrelation**2)
     innovations[0] = random.normal() * sd
-    out: Array = lfilter([1.0], [1.0, -autocorrelation], innovations)
-    return out
+    return lfilter([1.0], [1.0, -autocorrelation], innovations)
 
 
 def made(
@@ -45,9 +42,7 @@ def made(
     """A trial with measured force that a fibre and a faulty measurement made.
 
     Args:
-        muscle: the fibre.
         trial: what it is said to be given.
-        random: of the noise.
         noise_sd_f0: standard deviation of the noise, F0.
         substeps: steps of the fibre between two samples.
         faults: values by name of `measurement.artefacts.ARTEFACTS`.

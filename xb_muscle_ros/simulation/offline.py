@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 
 import numpy as np
 
@@ -46,7 +46,6 @@ def outputs(
     """Settle isometrically at the first sample, step from sample to sample, and read the outputs.
 
     Args:
-        muscle: the fibre.
         dt_s: between samples, shape (n - 1,), s.
         length_l0: length change at the samples, linear between them, shape (n,), L0.
         calcium_um: calcium that acts in the step that ends at a sample, shape (n,), µM.
@@ -72,7 +71,6 @@ def simulate_trial(muscle: Muscle, trial: Trial, substeps: int = 1, settle_s: fl
     """Settle isometrically at the first sample, then step from sample to sample.
 
     Args:
-        muscle: the fibre.
         trial: length and calcium; length is linear between samples, calcium holds.
         substeps: steps between two samples; 1 is what the node does.
         settle_s: time to settle, s; None until at rest.
@@ -105,7 +103,6 @@ def pushing(trial: Trial, simulated: Simulated, model: str) -> str | None:
     """One line on a model that pushes, where a muscle would be slack; None where it pulls.
 
     Args:
-        trial, simulated: the trial and what the model made of it.
         model: its name, or that of its parameter set.
     """
     return pushing_line(trial.facts.trial, model, simulated.time_s, simulated.force_n / trial.facts.f0_n)
@@ -128,7 +125,3 @@ def one_for_all(lines: Sequence[str]) -> list[str]:
     """The first of the lines of `pushing`, and of how many more trials the same is true."""
     more = len(lines) - 1
     return [f"{lines[0]}; likewise in {more} more trial{'s' * (more > 1)}" if more else lines[0]] if lines else []
-
-
-Simulator = Callable[[Trial], Simulated]
-"""What replay compares with a recording: offline steps, or a node on the other side of DDS."""

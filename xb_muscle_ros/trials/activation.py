@@ -141,5 +141,4 @@ def _moving_mean(values: Array, samples: int) -> Array:
     """Mean over a window, centred; at the ends over what there is of it."""
     kernel = np.ones(samples)
     total = np.convolve(values, kernel, "same")
-    mean: Array = total / np.convolve(np.ones(values.size), kernel, "same")
-    return mean
+    return total / np.convolve(np.ones(values.size), kernel, "same")

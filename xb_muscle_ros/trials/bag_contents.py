@@ -28,7 +28,6 @@ class BagContents:
     """What a bag holds.
 
     Attributes:
-        path: the bag, as given.
         types: message type of each topic, of those without messages too.
         encodings: message encoding of each topic.
         definitions: format and text of each message type that the bag describes.
@@ -61,7 +60,6 @@ def open_bag(path: Path, topics: Container[str] | None = None) -> BagContents:
     the order. Quality of service plays no part.
 
     Args:
-        path: the bag.
         topics: messages of these alone are kept; None for all.
 
     Raises:

@@ -46,7 +46,6 @@ def check_values(trial: Trial, where: str, f0_is_known: bool = True, pca_is_know
 
     Args:
         trial: with all facts.
-        where: the bag, for messages.
         f0_is_known: whether bag, fibre file or user tell F0; else 1 N is taken for it.
         pca_is_known: whether the bag tells pCa; else calcium alone does.
 

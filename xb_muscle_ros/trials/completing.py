@@ -88,7 +88,9 @@ def complete(reading: Reading, known: Known) -> tuple[Trial, tuple[str, ...]]:
     elif _cut(trial):
         notes.append(_CUT)
     if "phases" in unknown:
-        trial = _with_phases(trial, _length_for_phases(trial, unknown, known))
+        facts, l0 = trial.facts, _length_for_phases(trial, unknown, known)
+        phases = detect_phases(trial.time_s, trial.length_m, facts.amplitude_l0, facts.recovery_s, l0)
+        trial = replace(trial, facts=replace(facts, phases=phases))
         hidden = [phase.name for phase in trial.facts.phases] == ["isometric"] and _moves(trial.length_m)
         notes.append("no phases found, though length moves: its noise hides them" if hidden else _PHASES)
     trial, told = _with_scales(trial, unknown, known)
@@ -160,12 +162,6 @@ def _length_for_phases(trial: Trial, unknown: frozenset[str], known: Known) -> f
         return known.reference_length_m
     sure = "reference_length_m" not in unknown and not known.first_isometric
     return trial.facts.reference_length_m if sure else None
-
-
-def _with_phases(trial: Trial, l0: float | None) -> Trial:
-    facts = trial.facts
-    phases = detect_phases(trial.time_s, trial.length_m, facts.amplitude_l0, facts.recovery_s, l0)
-    return replace(trial, facts=replace(facts, phases=phases))
 
 
 def _with_scales(trial: Trial, unknown: frozenset[str], known: Known) -> tuple[Trial, list[str]]:

@@ -46,8 +46,6 @@ def facts_from_custom_data(data: Mapping[str, str], where: str, fibre: str, tria
     """Facts from ``custom_data``; other keys are left alone.
 
     Args:
-        data: the bag's strings.
-        where: the bag, for messages.
         fibre: used where the data name no fibre.
         trial: used where the data name no trial.
 

@@ -59,7 +59,6 @@ def find_recordings(paths: Iterable[Path], out: Path | None = None) -> list[Path
     """Files and bag folders to import: those given, and in folders, at any depth, those that are called like one.
 
     Args:
-        paths: as the user gave them.
         out: folder of the bags that are made; what is in it is no recording.
 
     Raises:
@@ -83,9 +82,6 @@ def import_recordings(
     """Import files one by one. Of the files that are done, nothing is kept but names.
 
     Args:
-        paths: files and bag folders.
-        settings: mapping and options.
-        out: folder of the bags; made if need be.
         overwrite: replace bags that exist and were made of something else.
 
     Raises:

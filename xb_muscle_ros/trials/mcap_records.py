@@ -69,7 +69,6 @@ def read_recording(path: Path, topics: Container[str] | None = None) -> Recordin
     """Read an MCAP file, whole or not.
 
     Args:
-        path: the file.
         topics: messages of these alone are kept; None for all.
 
     Raises:

@@ -74,7 +74,6 @@ def conditioning(
     Args:
         time_s, length_m: shape (n,), the record; s, m.
         l0: the length that is L0, m.
-        phases: of the record.
 
     Returns:
         None for what is not plain: both where the trial is no paper's protocol, recovery of a reference trial.

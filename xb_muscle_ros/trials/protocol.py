@@ -38,7 +38,6 @@ class Allowed(NamedTuple):
 
         Args:
             what: begins the message: the option or field.
-            value: the number.
 
         Raises:
             UserError: out of range or not a number.

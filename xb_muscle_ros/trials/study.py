@@ -40,9 +40,7 @@ def read_study(paths: Iterable[str | Path], fibre: str, known: Known, only: str 
     asked for; else of the one that its facts are of.
 
     Args:
-        paths: bags, or folders of bags.
         fibre: name of the fibre whose parameters are used.
-        known: what is known beside the bags.
         only: take trials of this fibre and no other.
 
     Raises:
@@ -65,12 +63,6 @@ def trial_of_bag(bag: TrialBag, fibre: str, known: Known, where: str) -> tuple[T
     """One fibre's trial, complete and checked, and lines on what is not the bag's own.
 
     Corners of length that lie between samples are put back here, so that every command simulates the same lengths.
-
-    Args:
-        bag: opened.
-        fibre: one of its fibres.
-        known: what is known beside the bag.
-        where: the bag, for messages.
 
     Raises:
         UserError: see `TrialBag.reading` and `check_values`.

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from made_trials import given_fibre
 
+from xb_muscle_ros.diagnose.effort import Effort
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.search.descent import Fit
-from xb_muscle_ros.diagnose.search.explore import Effort, Explorer
+from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import INDEPENDENT, Names, System, ordered
 from xb_muscle_ros.work import Options
 
@@ -24,7 +25,7 @@ VISCO, LATTICE, SHIFT = Name.PASSIVE_VISCOELASTICITY, Name.LATTICE_SPACING, Name
 class ByHand(Explorer):
     """Effects are worth what their fits say, and nothing else."""
 
-    def adjusted(self, names: Names, fibres: Sequence[int] | None = None) -> float:
+    def adjusted(self, names: Names, fibres: Sequence[int]) -> float:
         """Nothing."""
         return 0.0
 

@@ -15,7 +15,6 @@ from xb_muscle_ros.diagnose.inference.heldout import HeldOut
 from xb_muscle_ros.diagnose.names import FAMILY, Name
 from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.diagnose.search.system import System
-from xb_muscle_ros.work import Options
 
 BETTER = HeldOutGain(0.2, 0.05, "log RMSD ratio", 5, 0.02, 0.016)
 NO_BETTER = HeldOutGain(0.04, 0.05, "log RMSD ratio", 5, 0.02, 0.019)
@@ -23,8 +22,8 @@ NO_BETTER = HeldOutGain(0.04, 0.05, "log RMSD ratio", 5, 0.02, 0.019)
 
 def component(name: Name, probability: float, gain: HeldOutGain | None = BETTER, *others: Name) -> Component:
     kind = Kind.ARTEFACT if name is SHIFT else Kind.MECHANISM
-    members = tuple(n.value for n in (name, *others))
-    return Component(name.value, kind, FAMILY[name], members, probability, heldout_gain=gain)
+    members = (name, *others)
+    return Component(name, kind, FAMILY[name], members, probability, heldout_gain=gain)
 
 
 TABLE = [
@@ -68,7 +67,7 @@ def test_the_answer_has_mechanisms_of_evidence_and_a_family_s_likeliest_member()
 def judged(*rows: tuple[tuple[Name, ...], float]) -> Judged:
     made = with_odds(*rows)
     recorded = [System(given_fibre(), (), np.empty(0), NOISE_F0)]
-    return Judged.of(made, HeldOut(made, recorded, 8, Options(processes=0, quiet=True)), [NOISE_F0])
+    return Judged.of(made, HeldOut(made, recorded), [NOISE_F0])
 
 
 def test_the_chosen_set_has_all_that_is_named_and_no_more() -> None:
@@ -99,16 +98,16 @@ def test_nothing_of_evidence_leaves_the_base() -> None:
 def test_a_fibre_replicates_what_it_adds_to_the_others() -> None:
     rows = {(): [fit((), 0.0) for _ in range(3)], (DRAG,): [fit((DRAG,), gained) for gained in (6.0, -1.0, 0.9)]}
     e = explorer(rows, 3)
-    judged = Judged.of(e, HeldOut(e, e.systems, 5, Options()), [NOISE_F0] * 3)
+    judged = Judged.of(e, HeldOut(e, e.systems), [NOISE_F0] * 3)
     assert [judged.replication([DRAG], i) for i in range(3)] == pytest.approx([6.0, -1.0, 0.9])
     rated = [OfFibre("a", 0.1, 0.0, None, (), judged.replication([DRAG], i)) for i in range(3)]
     assert [row.replicates for row in rated] == [True, False, False]
     # Nobody looked at a model without it, so nothing can be said.
     only = explorer({(DRAG,): rows[DRAG,]}, 3)
-    assert Judged.of(only, HeldOut(only, only.systems, 5, Options()), [NOISE_F0] * 3).replication([DRAG], 0) is None
+    assert Judged.of(only, HeldOut(only, only.systems), [NOISE_F0] * 3).replication([DRAG], 0) is None
 
 
 def test_one_fibre_replicates_nothing() -> None:
     e = with_odds(((), 0.0), ((DRAG,), 6.0))
-    judged = Judged.of(e, HeldOut(e, e.systems, 5, Options()), [NOISE_F0])
+    judged = Judged.of(e, HeldOut(e, e.systems), [NOISE_F0])
     assert judged.replication([DRAG], 0) is None

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from by_hand import DRAG, EFFECTIVE, LATTICE, NOISE_F0, SHIFT, STIFFNESS, TITIN, VISCO, explorer, fit, with_odds
 
-from xb_muscle_ros.diagnose.inference.averaging import averaged, families, grouped
+from xb_muscle_ros.diagnose.inference.averaging import averaged, by_family, grouped
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.search.explore import Explorer
 
@@ -95,7 +95,7 @@ def test_names_that_take_each_other_s_place_are_rivals() -> None:
 
 
 def test_families_are_those_of_the_names() -> None:
-    found = families([DRAG, TITIN, STIFFNESS, VISCO])
+    found = by_family([DRAG, TITIN, STIFFNESS, VISCO])
     assert found["parallel_viscoelasticity"] == [DRAG, VISCO]
     assert found["calcium_dependent_elasticity"] == [TITIN, STIFFNESS]
     assert np.sum([len(v) for v in found.values()]) == 4

@@ -54,7 +54,7 @@ def test_no_more_groups_than_asked_for_and_each_spread_over_calcium() -> None:
 
 def test_fewer_than_three_trials_leave_nothing_out() -> None:
     assert folds_of([trial("a", "x", 6.0), trial("b", "y", 6.2)], 8) == []
-    assert not HeldOut(explorer({(): [fit((), 0.0)]}), [System(given_fibre(), (), np.empty(0), 1e-3)], 8, OPTIONS)
+    assert not HeldOut(explorer({(): [fit((), 0.0)]}), [System(given_fibre(), (), np.empty(0), 1e-3)])
 
 
 def by_hand(errors: Mapping[str, tuple[float, float]], fibres: int = 1, samples: tuple[int, ...] = ()) -> HeldOut:
@@ -63,7 +63,7 @@ def by_hand(errors: Mapping[str, tuple[float, float]], fibres: int = 1, samples:
     trials = tuple(trial(n, n, 6.0 + k / 10, size) for k, (n, size) in enumerate(zip(errors, sizes, strict=True)))
     recorded = [System(given_fibre(), trials, np.empty(0), 1e-3)] * fibres
     made = explorer({(): [fit((), 0.0)] * fibres, (DRAG,): [fit((DRAG,), 0.0)] * fibres}, fibres)
-    held = HeldOut(made, recorded, 8, OPTIONS)
+    held = HeldOut(made, recorded)
     for place, names in enumerate(((), (DRAG,))):
         found = {(i, t.name): t.measured_f0 + errors[t.name][place] for i in range(fibres) for t in trials}
         held._found[names] = {key: force for key, force in found.items() if np.all(np.isfinite(force))}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
@@ -69,7 +68,7 @@ def test_false_alarms_where_windows_are_short(study: Any, model_of: Any) -> None
     for k in range(16):
         noise = study.noise(_rng(k), memory=0.97)
         found = significance(study.after(noise), study.fit, model_of(study.windows(noise)), draws=60, seed=k)
-        assert not found.detected()
+        assert not found.detected(0.05)
         p.append(found.overall_p)
     # 4 and more of 16 at 5 % have a chance of 1 %.
     assert np.count_nonzero(np.array(p) <= 0.05) <= 3
@@ -86,24 +85,24 @@ def test_without_the_refit_the_null_would_be_wrong(study: Any, known: NoiseModel
 @pytest.mark.parametrize("sign", [1, -1])
 def test_bump_is_found_where_it_is(study: Any, known: NoiseModel, sign: int) -> None:
     found = significance(study.after(study.noise(_rng(2)) + bump(study, 3, sign * 0.012)), study.fit, known)
-    rows = found.mismatch()
-    assert found.detected()
+    rows = found.places("f", 0.05)
+    assert found.detected(0.05)
     assert found.overall_p <= 0.01
-    assert (rows[0]["trial"], rows[0]["phase"], rows[0]["sign"]) == ("pca6.3", "recovery", sign)
-    assert rows[0]["start_s"] == pytest.approx(0.28, abs=0.015)
-    assert rows[0]["end_s"] == pytest.approx(0.32, abs=0.015)
-    assert rows[0]["size_f0"] == pytest.approx(0.012 * np.sqrt(0.01 * np.sqrt(np.pi) / 0.1), rel=0.3)
-    assert [row["size_f0"] for row in rows] == sorted((row["size_f0"] for row in rows), reverse=True)
-    assert all(row["trial"] == "pca6.3" for row in rows)
+    assert (rows[0].trial, rows[0].phase, np.sign(rows[0].mean_f0)) == ("pca6.3", "recovery", sign)
+    assert rows[0].start_s == pytest.approx(0.28, abs=0.015)
+    assert rows[0].end_s == pytest.approx(0.32, abs=0.015)
+    assert rows[0].size_f0 == pytest.approx(0.012 * np.sqrt(0.01 * np.sqrt(np.pi) / 0.1), rel=0.3)
+    assert [row.size_f0 for row in rows] == sorted((row.size_f0 for row in rows), reverse=True)
+    assert all(row.trial == "pca6.3" for row in rows)
 
 
 def test_bump_below_the_practical_floor_is_significant_but_does_not_count(study: Any, known: NoiseModel) -> None:
     residuals = study.after(study.noise(_rng(3)) + bump(study, 4, 0.006))
     found = significance(residuals, study.fit, known)
     assert found.overall_p <= 0.05
-    assert not found.detected()
-    assert found.mismatch() == []
-    assert significance(residuals, study.fit, known, floor_f0=1e-4).detected()
+    assert not found.detected(0.05)
+    assert found.places("f", 0.05) == []
+    assert significance(residuals, study.fit, known, floor_f0=1e-4).detected(0.05)
 
 
 def test_what_parameters_can_do_is_no_mismatch(study: Any, known: NoiseModel) -> None:
@@ -118,12 +117,11 @@ def test_map_has_a_place_for_every_trial_and_phase(study: Any, known: NoiseModel
     short = study.residuals[0]._replace(phases=study.residuals[0].phases[:-1])
     residuals = (short, *study.after(study.noise(_rng(5)))[1:])
     table = significance(residuals, study.fit, known, draws=50).map()
-    assert json.loads(json.dumps(table)) == table
-    assert table["trials"] == [r.trial for r in residuals]
-    for name in ("rms_f0", "mean_f0", "p_value"):
-        assert np.shape(table[name]) == (5, len(table["phases"]))
-    hold = table["phases"].index("hold")
-    assert [row[hold] is None for row in table["rms_f0"]] == [True, False, False, False, False]
+    assert list(table.trials) == [r.trial for r in residuals]
+    for values in (table.rms_f0, table.mean_f0, table.p_value, table.counts):
+        assert np.shape(values) == (5, len(table.phases))
+    hold = table.phases.index("hold")
+    assert [row[hold] is None for row in table.rms_f0] == [True, False, False, False, False]
 
 
 def test_same_seed_same_answer(study: Any, known: NoiseModel) -> None:

@@ -58,7 +58,7 @@ def diagnoses(draw: Any, holes: bool = True) -> Diagnosis:
                            optional(plain))  # fmt: skip
 
     def component(names: tuple[Any, ...], kind: Kind) -> Component:
-        members = tuple(str(name.value) for name in names)
+        members = tuple(names)
         family = str(FAMILY[names[0]])
         rows = tuple(
             OfFibre(f, draw(SHARES), draw(share), draw(optional(gains)), draw(few(parameters, 1))) for f in fibres

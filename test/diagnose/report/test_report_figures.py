@@ -13,7 +13,15 @@ from layout_of_figures import boxes, outside, touching
 from many_of_everything import many
 from sample_diagnoses import ALL, Sample, five_fibres, nothing, one_fibre, unexplained
 
-from xb_muscle_ros.diagnose.report.figures import before_after, contributions, fibres, laws, probabilities, residual_map
+from xb_muscle_ros.diagnose.report.figures import (
+    FIGURES,
+    before_after,
+    contributions,
+    fibres,
+    laws,
+    probabilities,
+    residual_map,
+)
 from xb_muscle_ros.diagnose.report.figures.common import Figure, trial_labels
 from xb_muscle_ros.diagnose.result import Diagnosis
 
@@ -22,15 +30,7 @@ SIZES = [(1, 1, 3, 1), (1, 24, 12, 7), (5, 7, 6, 20), (40, 5, 30, 31)]
 
 
 def draw_all(sample: Sample) -> dict[str, Figure | None]:
-    d, traces = sample
-    return {
-        "before_after": before_after.draw_before_after(d, traces),
-        "probabilities": probabilities.draw_probabilities(d),
-        "contributions": contributions.draw_contributions(d, traces),
-        "fibres": fibres.draw_fibres(d),
-        "map": residual_map.draw_map(d),
-        "laws": laws.draw_laws(d),
-    }
+    return {name: draw(*sample) for name, draw in FIGURES.items()}
 
 
 @pytest.fixture

@@ -11,11 +11,12 @@ import pytest
 from by_hand import COUNT, DRAG, LATTICE, NOISE_F0, SHIFT, TITIN, explorer, fit, with_odds
 from made_trials import given_fibre
 
+from xb_muscle_ros.diagnose.effort import Effort
 from xb_muscle_ros.diagnose.inference.population import adjustment
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search import compiling, explore
 from xb_muscle_ros.diagnose.search.descent import Fit, fit_task
-from xb_muscle_ros.diagnose.search.explore import FORM, Effort, Explorer
+from xb_muscle_ros.diagnose.search.explore import FORM, Explorer
 from xb_muscle_ros.diagnose.search.promise import Promise
 from xb_muscle_ros.diagnose.search.system import Names, System, ordered
 from xb_muscle_ros.errors import UserError
@@ -139,9 +140,9 @@ def test_effects_that_are_alike_in_fibres_are_worth_more(system: System, drag_fi
     assert set(rows) == {"drag"}
     assert [row.value for row in rows["drag"]] == [drag_fit.values["drag"]] * 2
     assert all(row.effect and row.prior_mean == 0.0 and row.prior_sd == 0.02 for row in rows["drag"])
-    assert e.adjusted((DRAG,)) == pytest.approx(adjustment(rows["drag"]))
+    assert e.adjusted((DRAG,), [0, 1]) == pytest.approx(adjustment(rows["drag"]))
     assert e.adjusted((DRAG,), [0]) == pytest.approx(adjustment(rows["drag"][:1]))
-    assert e.adjusted((DRAG,)) > 2.0 * e.adjusted((DRAG,), [0])
+    assert e.adjusted((DRAG,), [0, 1]) > 2.0 * e.adjusted((DRAG,), [0])
 
 
 def test_other_systems_start_where_the_former_fits_ended(

@@ -35,13 +35,13 @@ def test_the_base_has_its_parameters_and_ordinary_errors(system: System) -> None
 def test_a_named_artefact_may_be_larger(name: Name, system: System) -> None:
     for c in system.problem((name,), {}).coordinates:
         if c.group is not None:
-            wider = BEYOND if c.name == name.value else 1.0
+            wider = BEYOND if c.name == name else 1.0
             assert c.prior_sd == pytest.approx(wider * ARTEFACTS[c.name].sd), c.label
 
 
 @pytest.mark.parametrize("name", [Name.VISCOUS_DRAG, Name.ACTIVE_TITIN, Name.FORCIBLE_DETACHMENT])
 def test_a_mechanism_brings_what_its_catalogue_fits(name: Name, system: System) -> None:
-    entry = CATALOGUE[name.value]
+    entry = CATALOGUE[name]
     found = {c.label: c for c in system.problem((name,), {}).coordinates}
     assert set(entry.parameters) <= set(found)
     assert set(found) - set(entry.parameters) == set(labels(system))

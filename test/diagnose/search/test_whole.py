@@ -77,7 +77,7 @@ def test_one_mechanism_in_the_whole_is_the_small_model_with_it(model: str, name:
     given = given_fibre(model)
     big = augmented(given, name)
     small = only(big, given, (name,))
-    assert small.model == f"{model}+{name.value}"
+    assert small.model == f"{model}+{name}"
     states = some_states(small, 4)
     bare = [evaluated(given, state) for state in states]
     for state in states:
@@ -123,7 +123,7 @@ def test_only_keeps_the_values_that_were_fitted_and_no_other() -> None:
 
 def test_what_is_absent_is_the_null_of_the_catalogue() -> None:
     for name in MECHANISMS:
-        entry = CATALOGUE[name.value]
+        entry = CATALOGUE[name]
         if entry.effect is None and name is not Name.THICK_FILAMENT_COOPERATIVITY:
             assert name in FRAMES
             assert entry.absent == {}

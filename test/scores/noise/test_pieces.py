@@ -90,5 +90,5 @@ def test_sampled_evenly(made: Any) -> None:
     even = made.even_times(0.1, 0.2, 1e-3)
     jitter, gaps = even + random.uniform(-2e-4, 2e-4, even.size), even[random.uniform(size=even.size) > 0.05]
     of = {"even": even, "jitter": jitter, "gaps": gaps, "spreading": made.spreading_times(0.1, 60.0)}
-    found = {key: evenly_sampled(made.relaxing("a", t, 0.1, np.zeros(t.size))) for key, t in of.items()}
+    found = {key: evenly_sampled(t) for key, t in of.items()}
     assert found == {"even": True, "jitter": True, "gaps": True, "spreading": False}

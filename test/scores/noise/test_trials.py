@@ -107,7 +107,7 @@ def test_false_alarms_on_noise_taken_from_curves(made: Any, make: Any) -> None:
             for t, e in zip(trials, noise, strict=True)
         ]
         found = significance(residuals, nothing_fitted(sum(e.size for e in noise)), noise_of(trials), 60, seed)
-        assert not found.detected()
+        assert not found.detected(0.05)
         p.append(found.overall_p)
     # 4 and more of 12 at 5 % have a chance of 0.2 %.
     assert np.count_nonzero(np.array(p) <= 0.05) <= 3

@@ -10,7 +10,8 @@ import pytest
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.csv import read_csv
-from xb_muscle_ros.trials.readers.mapping import ImportMapping, build_mapping, load_mapping
+from xb_muscle_ros.trials.readers.description import ImportMapping
+from xb_muscle_ros.trials.readers.mapping import build_mapping, load_mapping
 from xb_muscle_ros.trials.trial import Trial
 
 TIME_S = np.arange(300) / 1000

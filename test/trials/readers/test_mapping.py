@@ -12,8 +12,9 @@ import pytest
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.activation import CalciumTransient
+from xb_muscle_ros.trials.readers.columns import BAG
 from xb_muscle_ros.trials.readers.description import filled
-from xb_muscle_ros.trials.readers.mapping import BAG, build_mapping, load_mapping
+from xb_muscle_ros.trials.readers.mapping import build_mapping, load_mapping
 from xb_muscle_ros.trials.readers.units import Quantity
 
 TREE: dict[str, Any] = {

@@ -20,11 +20,10 @@ from xb_muscle_ros.diagnose.inference.calibration import (
 )
 from xb_muscle_ros.diagnose.inference.heldout import HeldOut
 from xb_muscle_ros.diagnose.inference.population import distribution
-from xb_muscle_ros.diagnose.inference.shares import unique
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.result import Verdict
 from xb_muscle_ros.diagnose.search.explore import Explorer
-from xb_muscle_ros.diagnose.search.system import Names, ordered
+from xb_muscle_ros.diagnose.search.system import Names, at_bound, ordered
 from xb_muscle_ros.fit.coordinates import Coordinate
 from xb_muscle_ros.measurement.artefacts import ARTEFACTS as ARTEFACTS_BY_NAME
 from xb_muscle_ros.measurement.artefacts import ORDINARY
@@ -32,8 +31,6 @@ from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.parameters import PARAMETERS
 
 _NORMAL = 1.959964
-# A value this near a bound, as a share of the way between bounds, ended there.
-_AT_BOUND = 1e-3
 
 
 @dataclass(frozen=True)
@@ -41,8 +38,6 @@ class Judged:
     """A study, searched and predicted.
 
     Attributes:
-        explorer: all fits.
-        heldout: predictions of left-out conditions.
         averages: over all fibres.
         of_fibres: of each fibre.
         without_fibres: of all fibres but each; empty where there is one.
@@ -77,7 +72,7 @@ class Judged:
         """Inclusion probability of a component, by all fibres or by one."""
         averages = self.averages if fibre is None else self.of_fibres[fibre]
         # The base takes up ordinary errors, however large: what naming one gains is no residual, but its improbability.
-        ordinary = all(n.value in ORDINARY for n in group)
+        ordinary = all(n in ORDINARY for n in group)
         size_f0 = PRACTICAL_F0 if ordinary else averages.contribution_f0(group)
         constants = ARTEFACTS if group[0] in MEASUREMENT else CONSTANTS
         return calibrated(averages.log_odds(group), size_f0, constants)
@@ -92,6 +87,27 @@ class Judged:
         # What was only promised is worth no more than its cap, whatever a fibre says.
         raised = self.averages.fitted_alone.log_odds(group) - self.without_fibres[fibre].fitted_alone.log_odds(group)
         return min(max(raised, -MOST_LOG_ODDS), MOST_LOG_ODDS) if math.isfinite(raised) else None
+
+    def explained(self, names: Names) -> float:
+        """Share of the base's mean square beyond noise that a set takes away; between 0 and 1."""
+        before = self._excess((), None)
+        return float(np.clip(1.0 - self._excess(names, None) / before, 0.0, 1.0)) if before > 0.0 else 0.0
+
+    def ablation_loss(self, names: Names, without: Names, fibre: int | None = None) -> float:
+        """What a set loses without a part of it, all else fitted anew, as a share of the base's mismatch."""
+        before = self._excess((), fibre)
+        if before <= 0.0 or without not in self.explorer.fits:
+            return 0.0
+        back = self._squares(without, fibre) - self._squares(names, fibre)
+        return float(np.clip(back / before, 0.0, 1.0))
+
+    def _squares(self, names: Names, fibre: int | None) -> float:
+        fits = self.explorer.fits[names]
+        return float(sum(fit.mean_square_f0 for fit in (fits if fibre is None else [fits[fibre]])))
+
+    def _excess(self, names: Names, fibre: int | None) -> float:
+        noise_f0 = self.noise_f0 if fibre is None else [self.noise_f0[fibre]]
+        return self._squares(names, fibre) - sum(noise**2 for noise in noise_f0)
 
     @property
     def chosen(self) -> Names:
@@ -124,14 +140,15 @@ def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Compon
     without = tuple(n for n in chosen if n is not own)
     share, gain = 0.0, None
     if own is not None:
-        share = unique(e, chosen, without, judged.noise_f0)
+        share = judged.ablation_loss(chosen, without)
         gain = judged.heldout.gain(chosen, without)
-    best = _set_with(judged, lead)
+    best = max((s for s in e.fits if lead in s), key=e.evidence, default=None)
+    members = tuple(sorted(group, key=lambda n: (n is not lead, -judged.averages.including([n]))))
     by_fibre = tuple(
         OfFibre(
             fibre=system.fibre.name,
             inclusion_probability=judged.probability(group, i),
-            ablation_loss=unique(e, chosen, without, judged.noise_f0, i) if own is not None else 0.0,
+            ablation_loss=judged.ablation_loss(chosen, without, i) if own is not None else 0.0,
             heldout_gain=judged.heldout.gain(chosen, without, i) if own is not None else None,
             parameters=() if best is None else _of_one(judged, best, lead, i),
             replication=judged.replication(group, i),
@@ -139,37 +156,31 @@ def _component(judged: Judged, group: tuple[Name, ...], chosen: Names) -> Compon
         for i, system in enumerate(e.systems)
     )
     return Component(
-        name=lead.value if len(group) == 1 else FAMILY[lead],
+        name=lead if len(group) == 1 else FAMILY[lead],
         kind=Kind.ARTEFACT if lead in MEASUREMENT else Kind.MECHANISM,
         family=FAMILY[lead],
-        members=tuple(n.value for n in sorted(group, key=lambda n: (n is not lead, -judged.averages.including([n])))),
+        members=members,
         inclusion_probability=probability,
         ablation_loss=share,
         heldout_gain=gain,
         parameters=() if best is None else _of_all(judged, best, lead),
-        not_separable_from=tuple(n.value for n in rivals),
+        not_separable_from=tuple(rivals),
         by_fibre=by_fibre,
         log_odds=min(max(judged.averages.log_odds(group), -MOST_LOG_ODDS), MOST_LOG_ODDS),
         contribution_f0=judged.averages.contribution_f0(group),
     )
 
 
-def _set_with(judged: Judged, name: Name) -> Names | None:
-    """The set with the most evidence that has a name."""
-    having = [s for s in judged.explorer.fits if name in s]
-    return max(having, key=judged.explorer.evidence, default=None)
-
-
 def _of_one(judged: Judged, names: Names, name: Name, i: int) -> tuple[Parameter, ...]:
     """A name's parameters in one fibre."""
     fit = judged.explorer.fits[names][i]
     problem = judged.explorer.systems[i].problem(names, fit.values)
-    wanted = (name.value,) if name in MEASUREMENT else CATALOGUE[name.value].parameters
+    wanted = (name,) if name in MEASUREMENT else CATALOGUE[name].parameters
     rows = []
     for c in problem.coordinates:
         if c.name in wanted:
             value, z = fit.values[c.label], c.inward(fit.values[c.label])
-            rows.append(Parameter(c.label, _unit(c), value, _interval(c, z, fit.sds[c.label]), _at_bound(c, z)))
+            rows.append(Parameter(c.label, _unit(c), value, _interval(c, z, fit.sds[c.label]), at_bound(c, z)))
     return tuple(rows)
 
 
@@ -185,7 +196,7 @@ def _of_all(judged: Judged, names: Names, name: Name) -> tuple[Parameter, ...]:
     rows = []
     estimates = e.estimates(names)
     coordinates = {c.label: c for c in e.systems[0].problem(names, e.fits[names][0].values).coordinates}
-    for label in CATALOGUE[name.value].parameters:
+    for label in CATALOGUE[name].parameters:
         c, d = coordinates[label], distribution(estimates[label])
         # On a logarithmic scale the spread is that around the centre.
         value = c.outward(d.mean)
@@ -204,11 +215,6 @@ def _unit(c: Coordinate) -> str:
     return ARTEFACTS_BY_NAME[c.name].unit if c.group is not None else PARAMETERS[c.name].unit
 
 
-def _at_bound(c: Coordinate, z: float) -> bool:
-    low, high = c.inward(c.lower), c.inward(c.upper)
-    return not _AT_BOUND * (high - low) < z - low < (1.0 - _AT_BOUND) * (high - low)
-
-
 def answer_of(found: Sequence[Component]) -> tuple[str, ...]:
     """Mechanisms of the answer, best first: of a family whose members are not separable its likeliest one."""
     return tuple(c.members[0] for c in found if c.kind is Kind.MECHANISM and c.inclusion_probability >= NAMED)
@@ -218,7 +224,6 @@ def verdict_of(found: Sequence[Component], described: bool, detected: bool, fine
     """What the diagnosis says as a whole.
 
     Args:
-        found: all components.
         described: whether the base describes the recordings at all.
         detected: whether the base leaves more than noise and the practical floor.
         fine: whether the fibre file as given is as good as the base fitted anew.

@@ -13,8 +13,7 @@ from xb_muscle_ros.diagnose.answers import FAMILY, NAMES
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import Names, without
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # What one more name costs that was not fitted, in the place of its occam factor.
 _UNFITTED = 1.5
@@ -53,15 +52,18 @@ class Averaged:
         sets = tuple(s for s, k in zip(self.sets, kept, strict=True) if k)
         return Averaged(sets, self.log_evidence[kept], self.mean_square_f0[kept], self.fitted[kept])
 
+    def _having(self, names: Collection[Name]) -> npt.NDArray[np.bool_]:
+        """Sets that have one of some names, or several, shape (sets,)."""
+        wanted = set(names)
+        return np.array([bool(wanted & set(s)) for s in self.sets], dtype=np.bool_)
+
     def including(self, names: Collection[Name]) -> float:
         """That one of some names, or several, are part of the truth."""
-        wanted = set(names)
-        return float(min(1.0, sum(p for p, s in zip(self.probability, self.sets, strict=True) if wanted & set(s))))
+        return float(min(1.0, sum(self.probability[self._having(names)])))
 
     def log_odds(self, names: Collection[Name]) -> float:
         """Of the same; as large as the numbers allow."""
-        wanted = set(names)
-        here = np.array([bool(wanted & set(s)) for s in self.sets])
+        here = self._having(names)
         if not np.any(here) or np.all(here):
             return -math.inf if not np.any(here) else math.inf
         return float(np.logaddexp.reduce(self.log_evidence[here]) - np.logaddexp.reduce(self.log_evidence[~here]))
@@ -71,10 +73,8 @@ class Averaged:
 
         Without them and their families: kin that does as well in their place does not make them idle.
         """
-        wanted = set(names)
-        kin = {n for n in NAMES if FAMILY[n] in {FAMILY[w] for w in wanted}}
-        here = np.array([bool(wanted & set(s)) for s in self.sets])
-        without = np.array([not kin & set(s) for s in self.sets])
+        families = {FAMILY[n] for n in names}
+        here, without = self._having(names), ~self._having([n for n in NAMES if FAMILY[n] in families])
         if not np.any(here) or not np.any(without):
             return 0.0
         best = [int(np.argmax(np.where(chosen, self.log_evidence, -np.inf))) for chosen in (here, without)]
@@ -127,7 +127,7 @@ def averaged(explorer: Explorer, fibres: Sequence[int] | None = None) -> Average
     return Averaged(tuple(sets), found - found.max(), np.array(squares), np.array(fitted))
 
 
-def families(names: Sequence[Name]) -> dict[str, list[Name]]:
+def by_family(names: Sequence[Name]) -> dict[str, list[Name]]:
     """Names by family."""
     found: dict[str, list[Name]] = {}
     for name in names:
@@ -138,7 +138,7 @@ def families(names: Sequence[Name]) -> dict[str, list[Name]]:
 def grouped(averages: Averaged, names: Sequence[Name]) -> list[tuple[Name, ...]]:
     """Components: names that stand for themselves, and families whose members the recordings do not tell apart."""
     found: list[tuple[Name, ...]] = []
-    for members in families(names).values():
+    for members in by_family(names).values():
         order = sorted(members, key=lambda n: -averages.including([n]))
         together = averages.including(order)
         rest = [n for n in order if averages.including([n]) >= 0.1 * together]

@@ -39,7 +39,6 @@ def calibrated(log_odds: float, contribution_f0: float, constants: Constants = C
     Args:
         log_odds: by averaging over sets.
         contribution_f0: root of what it takes off the mean square of the best set without it, F0.
-        constants: of the calibration.
     """
     if math.isinf(log_odds) and log_odds < 0.0:
         return 0.0

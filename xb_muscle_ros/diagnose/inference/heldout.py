@@ -12,10 +12,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.component import HeldOutGain
-from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.search.descent import Fit, fitted
 from xb_muscle_ros.diagnose.search.explore import Explorer
 from xb_muscle_ros.diagnose.search.system import SATURATING, Names, System
@@ -23,9 +21,9 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.calibration import calibrated_force
 from xb_muscle_ros.fit.correction import Correction
 from xb_muscle_ros.fit.data import FitTrial
-from xb_muscle_ros.work import Options, run
+from xb_muscle_ros.trials.trial import Array
+from xb_muscle_ros.work import run
 
-Array = npt.NDArray[np.float64]
 Trials = Mapping[tuple[int, str], Array]
 """Force by fibre (its place in the study) and trial, F0."""
 
@@ -56,9 +54,8 @@ def predict_task(task: Mapping[str, Any]) -> list[list[float]] | None:
     """Forces of held-out trials by a set that is fitted without them; None where the model has no solution."""
     system = System.from_json(task["system"])
     trials = [FitTrial.from_json(row) for row in task["trials"]]
-    names = [Name(n) for n in task["names"]]
     held = {t.name for t in trials}
-    found = fitted(system.without(held), names, [task["values"]], task["most"], task["tolerance"])
+    found = fitted(system.without(held), task["names"], [task["values"]], task["most"], task["tolerance"])
     if found is None:
         return None
     closure = {name: np.array(values) for name, values in task["closure_f0"].items()}
@@ -87,9 +84,9 @@ class HeldOut:
         folds: of each fibre, which are left out in turn; empty where nothing can be.
     """
 
-    def __init__(self, explorer: Explorer, recorded: Sequence[System], most: int, options: Options) -> None:
-        self.explorer, self.recorded, self.options = explorer, list(recorded), options
-        self.folds = [folds_of(system.trials, most) for system in recorded]
+    def __init__(self, explorer: Explorer, recorded: Sequence[System]) -> None:
+        self.explorer, self.recorded = explorer, list(recorded)
+        self.folds = [folds_of(system.trials, explorer.effort.folds) for system in recorded]
         self._found: dict[Names, dict[tuple[int, str], Array]] = {}
 
     def __bool__(self) -> bool:
@@ -110,14 +107,14 @@ class HeldOut:
                         "system": plain,
                         "trials": [t.to_json() for t in trials],
                         "closure_f0": {t.name: full.closure_f0[t.name].tolist() for t in trials if full.closure_f0},
-                        "names": [n.value for n in names],
+                        "names": list(names),
                         "values": dict(self.explorer.fits[names][i].values),
                         "most": max(2, self.explorer.effort.most // 2),
                         "tolerance": self.explorer.effort.tolerance,
                     }
                     tasks.append(task)
                     places.append((names, i, [t.name for t in trials]))
-        rows = run(predict_task, tasks, replace(self.options, label="held out")) if tasks else []
+        rows = run(predict_task, tasks, replace(self.explorer.options, label="held out")) if tasks else []
         for (names, i, held), row in zip(places, rows, strict=True):
             found = self._found.setdefault(names, {})
             for k, name in enumerate(held):

@@ -13,9 +13,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
-
-Array = npt.NDArray[np.float64]
 
 # Widths of an effect's prior to average over, in units of its own; spreads over fibres, in units of that width: fibres
 # of one muscle resemble each other more than the prior knows.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -9,9 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.trial import Phase
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array, Phase
 
 # What length changes leave behind passes fast at first, s; pauses longer than twice this are cut there.
 EARLY_S = 0.1
@@ -26,11 +25,9 @@ class Residual(NamedTuple):
     """Measured minus simulated force of one trial.
 
     Attributes:
-        trial: name.
         pca: None where calcium changes.
         time_s: shape (n,), increasing, s.
         value_f0: shape (n,), measured minus simulated, F0.
-        phases: of the trial.
         length_l0: shape (n,), length change at these times, L0.
         calcium_um: shape (n,), µM.
     """
@@ -48,7 +45,6 @@ class Cell(NamedTuple):
     """Some samples of one trial.
 
     Attributes:
-        trial: name.
         phase: name of the phase; ``_early`` and ``_late`` are parts of it, a number tells the second from the first.
         start_s, end_s: time of the first sample and of the last.
         begin, end: samples, counted through all trials, `end` not included.
@@ -85,6 +81,18 @@ def check(residuals: Sequence[Residual]) -> None:
             raise UserError(f"trial {r.trial}: the residual is not finite; leave the trial out")
         if np.any(np.diff(r.time_s) <= 0.0):
             raise UserError(f"trial {r.trial}: times of the residual do not increase; sort the samples")
+
+
+def slices(residuals: Sequence[Residual], samples: int) -> list[slice]:
+    """Where the samples of each trial are, all one below the other.
+
+    Raises:
+        UserError: a fit's slopes have another number of samples.
+    """
+    edges = np.cumsum([0, *(r.time_s.size for r in residuals)]).tolist()
+    if edges[-1] != samples:
+        raise UserError(f"residuals have {edges[-1]} samples, the fit's slopes {samples}; give the same")
+    return [slice(a, b) for a, b in itertools.pairwise(edges)]
 
 
 def cut(residuals: Sequence[Residual]) -> tuple[Cell, ...]:
@@ -178,7 +186,6 @@ def exceeding(time_s: Array, value_f0: Array, threshold_f0: float) -> tuple[floa
 
     Args:
         time_s, value_f0: of one cell, shape (n,).
-        threshold_f0: F0.
     """
     width = max(value_f0.size // 8, 1)
     counts = np.convolve(np.ones(value_f0.size), np.ones(width), "same")

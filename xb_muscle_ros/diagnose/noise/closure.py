@@ -12,7 +12,6 @@ from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.search.whole import only
 from xb_muscle_ros.distribution.gaussian import Gaussian
@@ -24,8 +23,7 @@ from xb_muscle_ros.models.composition import Composition
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.parameters import complete
 from xb_muscle_ros.models.registry import compose, model_of_set
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Less than this is rounding, F0.
 _LEAST_F0 = 1e-6

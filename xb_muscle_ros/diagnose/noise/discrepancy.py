@@ -7,19 +7,17 @@ freely, is chosen by cross-validation over the training trials; where it does no
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.noise.cells import Residual
+from xb_muscle_ros.diagnose.noise.cells import Residual, slices
 from xb_muscle_ros.diagnose.noise.law import exponential_basis, scales
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.linear_fit import LinearFit
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 _TAU_S = np.geomspace(0.002, 5.0, 8)
 # Against the mean square of a column before the fit took its part.
@@ -33,14 +31,10 @@ class Discrepancy(NamedTuple):
 
     Attributes:
         predicted_f0: predicted residual of each held-out trial, in their order, F0.
-        scalings: what its terms scale with; empty where nothing is predicted.
-        ridge: how strongly weights are held to 0.
         explained: share of the training residual's mean square that was predicted of trials left out.
     """
 
     predicted_f0: tuple[Array, ...]
-    scalings: tuple[str, ...]
-    ridge: float
     explained: float
 
 
@@ -62,8 +56,7 @@ def discrepancy(
     known = scales(residuals, fit, scalings)
     if len(held_out) != len(residuals):
         raise UserError(f"{len(held_out)} marks of held-out trials for {len(residuals)} trials; give one each")
-    edges = np.cumsum([0, *(r.time_s.size for r in residuals)])
-    parts = [slice(int(a), int(b)) for a, b in itertools.pairwise(edges)]
+    parts = slices(residuals, fit.slopes.shape[0])
     train = [part for part, out in zip(parts, held_out, strict=True) if not out]
     held = [part for part, out in zip(parts, held_out, strict=True) if out]
     if not train:
@@ -111,11 +104,11 @@ def _chosen(
         if total[k] > max(best[0], _LEAST_SHARE * silent.sum()) and not _luck(gain[k], silent):
             best = (float(total[k]), tuple(chosen), float(_RIDGES[k]))
     if not best[1]:
-        return Discrepancy(tuple(np.zeros(part.stop - part.start) for part in held), (), 0.0, 0.0)
+        return Discrepancy(tuple(np.zeros(part.stop - part.start) for part in held), 0.0)
     which = np.flatnonzero(np.isin(owner, best[1]))
     weights = _ridge(gram.sum(axis=0)[which][:, which], across.sum(axis=0)[which], best[2] * samples.sum())
     predicted = tuple(columns[part][:, which] @ weights for part in held)
-    return Discrepancy(predicted, best[1], best[2], best[0] / float(silent.sum()))
+    return Discrepancy(predicted, best[0] / float(silent.sum()))
 
 
 def _luck(gain: Array, silent: Array) -> bool:

@@ -7,22 +7,19 @@ coordinates could have taken is taken out of each before it is compared with the
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import nnls
 
-from xb_muscle_ros.diagnose.noise.cells import Residual, check
+from xb_muscle_ros.diagnose.noise.cells import Residual, check, slices
+from xb_muscle_ros.diagnose.residual import ResidualLaw
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.scores.noise.members import recursion
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 TAU_S = np.geomspace(0.002, 5.0, 18)
 CONSTANT = "constant"
@@ -31,36 +28,6 @@ _RIDGE = 1e-4
 # Time constants within this factor of the largest one's are one law.
 _NEAR = 4.0
 _LEAST_F0 = 1e-9
-
-
-class Law(NamedTuple):
-    """What the residual follows.
-
-    Attributes:
-        tau_s: time constants that were offered, shape (n,), s.
-        weight_f0: root-mean-square force of each response in the recordings before any refit, shape (n,), F0, with the
-            sign of the law.
-        gain_f0_per_l0: of each response, shape (n,): force per unit of it where what it scales with is 1.
-        time_constant_s: the dominant one.
-        scales_with: ``constant`` or a name among the scalings.
-        sign: 1: measured force lacks in the model with the sign of velocity; -1: against it.
-        explained: share of the residual's mean square that the law predicts of trials left out (one trial: of itself).
-        others: the same share for what else it could scale with, by name.
-    """
-
-    tau_s: Array
-    weight_f0: Array
-    gain_f0_per_l0: Array
-    time_constant_s: float
-    scales_with: str
-    sign: int
-    explained: float
-    others: Mapping[str, float]
-
-    @property
-    def stiffness_f0_per_l0(self) -> float:
-        """Of all responses together: force per length of a sudden change."""
-        return float(np.sum(self.gain_f0_per_l0))
 
 
 def exponential_basis(time_s: Array, change_l0: Array, tau_s: Array) -> Array:
@@ -80,11 +47,8 @@ def exponential_basis(time_s: Array, change_l0: Array, tau_s: Array) -> Array:
 
 
 def law(
-    residuals: Sequence[Residual],
-    fit: LinearFit,
-    scalings: Mapping[str, Sequence[Array]],
-    tau_s: Array = TAU_S,
-) -> Law | None:
+    fibre: str, residuals: Sequence[Residual], fit: LinearFit, scalings: Mapping[str, Sequence[Array]]
+) -> ResidualLaw | None:
     """The law of a fit's residual; None where no response predicts anything of a trial left out.
 
     Non-negative least squares over all time constants at once, with either sign, for each thing that the law may
@@ -94,23 +58,21 @@ def law(
         residuals: of all trials, after the fit.
         fit: its normal equations, samples in the order of the residuals.
         scalings: by name, for each trial: activation, calcium (0 to 1, saturating), force ... at the residual's times.
-        tau_s: time constants to offer, s.
 
     Raises:
         UserError: residuals, samples or scalings that do not belong together.
     """
     known = scales(residuals, fit, scalings)
     target = np.concatenate([r.value_f0 for r in residuals])
-    edges = np.cumsum([0, *(r.time_s.size for r in residuals)])
     if float(np.sqrt(np.mean(target**2))) < _LEAST_F0:
         return None
-    plain = np.concatenate([exponential_basis(r.time_s, np.diff(r.length_l0), tau_s) for r in residuals])
+    plain = np.concatenate([exponential_basis(r.time_s, np.diff(r.length_l0), TAU_S) for r in residuals])
     best: tuple[float, str, int, Array, Array] | None = None
     shares: dict[str, float] = {}
     for name, scale in known.items():
         columns = plain * scale[:, None]
         sizes = np.maximum(np.sqrt(np.mean(columns**2, axis=0)), 1e-300)
-        products = _Products(fit.residual(columns / sizes), target, edges)
+        products = _Products(fit.residual(columns / sizes), target, slices(residuals, target.size))
         for sign in (1, -1):
             share = products.explained(sign)
             shares[name] = max(share, shares.get(name, -math.inf))
@@ -119,26 +81,25 @@ def law(
     if best is None or best[0] <= 0.0 or not np.any(best[3] > 0.0):
         return None
     share, name, sign, weights, sizes = best
-    top = float(tau_s[int(np.argmax(weights))])
-    near = np.abs(np.log(tau_s / top)) <= math.log(_NEAR)
-    return Law(
-        tau_s=tau_s,
-        weight_f0=sign * weights,
-        gain_f0_per_l0=sign * weights / sizes,
-        time_constant_s=float(np.exp(np.average(np.log(tau_s[near]), weights=weights[near]))),
+    top = float(TAU_S[int(np.argmax(weights))])
+    near = np.abs(np.log(TAU_S / top)) <= math.log(_NEAR)
+    return ResidualLaw(
+        fibre=fibre,
+        time_constant_s=float(np.exp(np.average(np.log(TAU_S[near]), weights=weights[near]))),
         scales_with=name,
-        sign=sign,
-        explained=share,
-        others={other: value for other, value in shares.items() if other != name},
+        gain_f0_per_l0=float(np.sum(sign * weights / sizes)),
+        explained_fraction=share,
+        tau_s=tuple(TAU_S.tolist()),
+        weight_f0=tuple((sign * weights).tolist()),
+        other_scalings={other: value for other, value in shares.items() if other != name},
     )
 
 
 class _Products:
     """Products of columns and of columns with the target, trial by trial: all that least squares needs."""
 
-    def __init__(self, columns: Array, target: Array, edges: npt.NDArray[np.int64]) -> None:
-        self.columns, self.target = columns, target
-        self.parts = [slice(a, b) for a, b in itertools.pairwise(edges)]
+    def __init__(self, columns: Array, target: Array, parts: list[slice]) -> None:
+        self.columns, self.target, self.parts = columns, target, parts
         self.gram = np.array([columns[s].T @ columns[s] for s in self.parts])
         self.across = np.array([columns[s].T @ target[s] for s in self.parts])
         # In units of columns before the fit took its part: a response that it took stays small.
@@ -165,8 +126,7 @@ def scales(residuals: Sequence[Residual], fit: LinearFit, scalings: Mapping[str,
     """What a law may scale with, all trials one below the other, the constant first."""
     check(residuals)
     sizes = [r.time_s.size for r in residuals]
-    if sum(sizes) != fit.slopes.shape[0]:
-        raise UserError(f"residuals have {sum(sizes)} samples, the fit's slopes {fit.slopes.shape[0]}; give the same")
+    slices(residuals, fit.slopes.shape[0])
     out = {CONSTANT: np.ones(sum(sizes))}
     for name, arrays in scalings.items():
         if [a.size for a in arrays] != sizes:

@@ -6,12 +6,12 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.noise.cells import Residual
+from xb_muscle_ros.diagnose.noise.cells import Residual, slices
 from xb_muscle_ros.diagnose.noise.discrepancy import discrepancy
-from xb_muscle_ros.diagnose.noise.law import Law, law
+from xb_muscle_ros.diagnose.noise.law import law
 from xb_muscle_ros.diagnose.noise.significance import Significance, significance
+from xb_muscle_ros.diagnose.residual import ResidualLaw
 from xb_muscle_ros.diagnose.search.descent import Fit
 from xb_muscle_ros.diagnose.search.system import System
 from xb_muscle_ros.errors import naming
@@ -21,9 +21,7 @@ from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.scores.noise.model import NoiseModel
 from xb_muscle_ros.simulation.offline import outputs
-from xb_muscle_ros.trials.trial import Trial
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array, Trial
 
 
 @dataclass(frozen=True)
@@ -42,13 +40,7 @@ class Around:
 
     @staticmethod
     def of(recorded: System, fit: Fit, effective_samples: float) -> Around:
-        """A fit of thinned trials, at all samples.
-
-        Args:
-            recorded: the system with all samples.
-            fit: to the thinned ones.
-            effective_samples: how many independent residuals it had.
-        """
+        """A fit of thinned trials, which had so many independent residuals, in the system with all samples."""
         problem = recorded.problem(fit.names, fit.values)
         training = Training(problem)
         slopes, _ = training.slopes(problem.start)
@@ -68,14 +60,7 @@ class Around:
 
 @dataclass(frozen=True)
 class Recordings:
-    """The trials of one fibre with their noise.
-
-    Attributes:
-        trials: in the order of the system.
-        noise: of each.
-        draws: of the bootstrap.
-        seed: of its draws.
-    """
+    """The trials of one fibre, in the order of its system, with their noise; draws and seed are of the bootstrap."""
 
     trials: tuple[Trial, ...]
     noise: NoiseModel
@@ -108,19 +93,18 @@ class Recordings:
         """Median over trials of the noise's standard deviation, F0: one trial's slow creep is not everybody's noise."""
         return float(np.median([noise.sd_f0 for noise in self.noise.trials]))
 
-    def law(self, around: Around) -> Law | None:
+    def law(self, around: Around) -> ResidualLaw | None:
         """The law of a fit's residual."""
-        return law(self.residuals(around), around.fit, _scalings(around.problem))
+        return law(around.problem.fibre.name, self.residuals(around), around.fit, _scalings(around.problem))
 
-    def benchmark(self, around: Around, folds: Sequence[Collection[str]]) -> tuple[float, float, int] | None:
-        """Squared error of held-out trials by a fit taken as linear, without and with a discrepancy without physics.
+    def benchmark(self, around: Around, folds: Sequence[Collection[str]]) -> tuple[float, int] | None:
+        """Squared error of held-out trials by a fit taken as linear with a discrepancy without physics.
 
         Returns:
-            sums of squares, F0², and samples; None where a fold leaves nothing to learn from.
+            sum of squares, F0², and samples; None where a fold leaves nothing to learn from.
         """
         found, scalings = self.residuals(around), _scalings(around.problem)
-        plain = learnt = 0.0
-        samples = 0
+        total, samples = 0.0, 0
         for fold in folds:
             held = [r.trial in fold for r in found]
             if all(held):
@@ -128,14 +112,13 @@ class Recordings:
             weights = around.fit.weights * np.repeat([0.0 if h else 1.0 for h in held], [r.time_s.size for r in found])
             without = LinearFit(around.fit.slopes, weights, around.fit.prior)
             value = without.residual(around.residual_f0[:, None])[:, 0]
-            edges = np.cumsum([0, *(r.time_s.size for r in found)])
-            here = [r._replace(value_f0=value[a:b]) for r, a, b in zip(found, edges[:-1], edges[1:], strict=True)]
+            parts = slices(found, value.size)
+            here = [r._replace(value_f0=value[part]) for r, part in zip(found, parts, strict=True)]
             predicted = discrepancy(here, held, without, scalings).predicted_f0
             held_out = [r.value_f0 for r, h in zip(here, held, strict=True) if h]
-            plain += sum(float(np.sum(v**2)) for v in held_out)
-            learnt += sum(float(np.sum((v - p) ** 2)) for v, p in zip(held_out, predicted, strict=True))
+            total += sum(float(np.sum((v - p) ** 2)) for v, p in zip(held_out, predicted, strict=True))
             samples += sum(v.size for v in held_out)
-        return plain, learnt, samples
+        return total, samples
 
 
 def _scalings(problem: Problem) -> Mapping[str, list[Array]]:

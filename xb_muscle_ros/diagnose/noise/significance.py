@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.noise.cells import Cell, Residual, cut, exceeding, mean, phase_names, rms
+from xb_muscle_ros.diagnose.noise.cells import Cell, Residual, cut, exceeding, mean, phase_names, rms, slices
+from xb_muscle_ros.diagnose.residual import Place, ResidualMap
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.scores.noise.model import NoiseModel
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # A mismatch below this is of no use to anyone, F0, whatever its p-value, if it lasts so long; a shorter one has to be
 # larger as the root of the time: a few milliseconds at the end of a fast ramp are the steps' and the sampling's.
@@ -49,7 +49,6 @@ class Significance:
         overall_rms_f0: over all samples of all trials.
         overall_null_f0: what noise reaches of that in 95 of 100 draws.
         overall_p: chance that noise makes some cell, or the whole, stand out as much.
-        practical_f0: the practical floor.
     """
 
     residuals: tuple[Residual, ...]
@@ -63,20 +62,20 @@ class Significance:
     overall_p: float
     practical_f0: float
 
-    def counts(self, alpha: float = 0.05) -> npt.NDArray[np.bool_]:
+    def counts(self, alpha: float = ALPHA) -> npt.NDArray[np.bool_]:
         """Cells that stand out and are large enough to matter, shape (cells,)."""
         found: npt.NDArray[np.bool_] = (self.p_value <= alpha) & (self.rms_f0 > self.floor_f0)
         return found
 
-    def detected(self, alpha: float = 0.05) -> bool:
+    def detected(self, alpha: float = ALPHA) -> bool:
         """Whether there is a mismatch: some cell counts, or the whole stands out and exceeds the practical floor."""
         whole = self.overall_p <= alpha and self.overall_rms_f0 > max(self.practical_f0, self.overall_null_f0)
         return whole or bool(np.any(self.counts(alpha)))
 
-    def mismatch(self, alpha: float = 0.05) -> list[dict[str, Any]]:
-        """Cells that count as rows of plain data, those of the phases with the largest residual first; sizes in F0.
+    def places(self, fibre: str, alpha: float = ALPHA) -> list[Place]:
+        """Cells that count, of the phases with the largest residual first; where only the whole counts, the largest.
 
-        The times are those between which the smoothed residual exceeds the cell's floor.
+        The times of a cell that counts are those between which the smoothed residual exceeds its floor.
         """
         values = np.concatenate([r.value_f0 for r in self.residuals])
         times = np.concatenate([r.time_s for r in self.residuals])
@@ -84,29 +83,22 @@ class Significance:
         for i in np.flatnonzero(self.counts(alpha)):
             cell = self.cells[i]
             here = slice(cell.begin, cell.end)
-            start_s, end_s = exceeding(times[here], values[here], float(self.floor_f0[i]))
             phase, size = self._phase(cell)
-            row = self._row(int(i), phase, start_s, end_s)
-            rows.append((size, row["size_f0"], row))
-        return [row for _, _, row in sorted(rows, key=lambda r: r[:2], reverse=True)]
+            span_s = exceeding(times[here], values[here], float(self.floor_f0[i]))
+            rows.append((size, self._place(fibre, int(i), phase, *span_s)))
+        if not rows and self.detected(alpha):
+            i = int(np.argmax(self.rms_f0))
+            cell = self.cells[i]
+            return [self._place(fibre, i, cell.phase, cell.start_s, cell.end_s)]
+        rows.sort(key=lambda row: (row[0], row[1].size_f0), reverse=True)
+        return [place for _, place in rows]
 
-    def largest(self) -> dict[str, Any]:
-        """The cell with the largest residual as a row of plain data, whether it counts or not."""
-        i = int(np.argmax(self.rms_f0))
-        cell = self.cells[i]
-        return self._row(i, cell.phase, cell.start_s, cell.end_s)
-
-    def _row(self, i: int, phase: str, start_s: float, end_s: float) -> dict[str, Any]:
-        return {
-            "trial": self.cells[i].trial,
-            "phase": phase,
-            "start_s": start_s,
-            "end_s": end_s,
-            "size_f0": float(self.rms_f0[i]),
-            "mean_f0": float(self.mean_f0[i]),
-            "sign": 1 if self.mean_f0[i] >= 0.0 else -1,
-            "p_value": float(self.p_value[i]),
-        }
+    def _place(self, fibre: str, i: int, phase: str, start_s: float, end_s: float) -> Place:
+        trial = self.cells[i].trial
+        return Place(
+            fibre, trial, phase, start_s, end_s, float(self.rms_f0[i]), float(self.mean_f0[i]), float(self.p_value[i]),
+            pca=next(r.pca for r in self.residuals if r.trial == trial),
+        )  # fmt: skip
 
     def _phase(self, cell: Cell) -> tuple[str, float]:
         """Name of the phase that a cell is part of, and the residual's root mean square over all of it, F0."""
@@ -120,19 +112,19 @@ class Significance:
         inside = (r.time_s >= phase.start_s) & (r.time_s <= phase.end_s)
         return phase.name, float(np.sqrt(np.mean(r.value_f0[inside] ** 2)))
 
-    def map(self, alpha: float = ALPHA) -> dict[str, Any]:
-        """Trials by phases, as plain data; None where a trial lacks a phase; `counts` as in `counts`."""
-        trials, phases = [r.trial for r in self.residuals], phase_names(self.cells)
-        out: dict[str, Any] = {"trials": trials, "phases": phases}
-        for name, values in (("rms_f0", self.rms_f0), ("mean_f0", self.mean_f0), ("p_value", self.p_value)):
-            rows: list[list[float | None]] = [[None] * len(phases) for _ in trials]
-            for cell, value in zip(self.cells, values, strict=True):
-                rows[trials.index(cell.trial)][phases.index(cell.phase)] = float(value)
-            out[name] = rows
-        counted = [[False] * len(phases) for _ in trials]
-        for cell, counts in zip(self.cells, self.counts(alpha), strict=True):
-            counted[trials.index(cell.trial)][phases.index(cell.phase)] = bool(counts)
-        return {**out, "counts": counted}
+    def map(self) -> ResidualMap:
+        """Trials by phases; None where a trial lacks a phase."""
+        trials, phases = tuple(r.trial for r in self.residuals), tuple(phase_names(self.cells))
+        places = [(trials.index(cell.trial), phases.index(cell.phase)) for cell in self.cells]
+
+        def table(values: Array | npt.NDArray[np.bool_], absent: Any) -> tuple[tuple[Any, ...], ...]:
+            rows = [[absent] * len(phases) for _ in trials]
+            for (i, j), value in zip(places, values.tolist(), strict=True):
+                rows[i][j] = value
+            return tuple(map(tuple, rows))
+
+        rms_f0, mean_f0, p_value = (table(of, None) for of in (self.rms_f0, self.mean_f0, self.p_value))
+        return ResidualMap(trials, phases, rms_f0, mean_f0, p_value, table(self.counts(), False))
 
 
 def significance(
@@ -150,8 +142,6 @@ def significance(
         fit: its normal equations, samples in the order of the residuals.
         noise: of the trials; others may be among them.
         draws: of noise; no p-value is below 2/(draws + 1).
-        seed: of the draws.
-        floor_f0: the practical floor, F0.
 
     Raises:
         UserError: residuals that cannot be looked at, samples that are not those of the fit, a trial of unknown noise.
@@ -200,7 +190,7 @@ def null_residuals(
         UserError: see `significance`.
     """
     times_s = [r.time_s for r in residuals]
-    samples = _check_samples(residuals, fit)
+    samples = slices(residuals, fit.slopes.shape[0])[-1].stop
     if draws < 20:
         raise UserError(f"{draws} draws of noise; at least 20 are needed")
     chosen = noise.of([r.trial for r in residuals])
@@ -217,7 +207,7 @@ def sharpened(residuals: Sequence[Residual], fit: LinearFit, noise: NoiseModel) 
     Raises:
         UserError: see `significance`.
     """
-    _check_samples(residuals, fit)
+    slices(residuals, fit.slopes.shape[0])
     variances = []
     for r, of_trial in zip(residuals, noise.of([r.trial for r in residuals]).trials, strict=True):
         # Integrated autocorrelation time: so many samples are worth one independent one.
@@ -227,14 +217,6 @@ def sharpened(residuals: Sequence[Residual], fit: LinearFit, noise: NoiseModel) 
     used = weighted[fit.weights > 0.0]
     factor = 1.0 / math.sqrt(float(np.mean(used))) if used.size else 1.0
     return replace(fit, weights=fit.weights * max(factor, 1.0))
-
-
-def _check_samples(residuals: Sequence[Residual], fit: LinearFit) -> int:
-    """Samples of all trials."""
-    samples = sum(r.time_s.size for r in residuals)
-    if samples != fit.slopes.shape[0]:
-        raise UserError(f"residuals have {samples} samples, the fit's slopes {fit.slopes.shape[0]}; give the same")
-    return samples
 
 
 def family_wise(found: Array, null: Array) -> Array:

@@ -7,18 +7,31 @@ import enum
 import math
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
 
-from xb_muscle_ros.diagnose.report.older_formats import READ, renamed
 from xb_muscle_ros.diagnose.result import FORMAT, Diagnosis
 from xb_muscle_ros.errors import UserError
 
 T = TypeVar("T")
 
 _AGAIN = "run xb_muscle diagnose again"
+# Keys of former formats under today's names.
+_RENAMED: Mapping[int, Mapping[str, str]] = MappingProxyType(
+    {
+        2: {
+            "explained_share": "explained_fraction", "share_of_mismatch": "ablation_loss", "remaining": "residual",
+            "where": "places", "nuisances": "nuisance_parameters", "noise_from": "noise_source", "how": "glossary",
+            "explained": "explained_fraction", "others": "other_scalings",
+        },
+    }
+)  # fmt: skip
+_READ = tuple(_RENAMED)
+# Objects whose keys are no fields.
+_PLAIN = ("how", "augmented", "map_before", "map_after", "others")
 
 
 def to_json(d: Diagnosis) -> dict[str, Any]:
@@ -36,7 +49,6 @@ def from_json(row: object, where: str = "diagnosis.json") -> Diagnosis:
     be.
 
     Args:
-        row: as read.
         where: the file, for messages.
 
     Raises:
@@ -47,12 +59,26 @@ def from_json(row: object, where: str = "diagnosis.json") -> Diagnosis:
     version = row.get("format_version")
     if version is None and "version" in row:
         raise UserError(f"{where} was made by an older version (format {row['version']}); {_AGAIN}")
-    if version in READ:
-        row = {**renamed(row, version), "format_version": FORMAT}
+    if version in _READ:
+        row = {**renamed(row, _RENAMED[version], _PLAIN), "format_version": FORMAT}
     elif version != FORMAT:
-        known = " and ".join(map(str, (*READ, FORMAT)))
+        known = " and ".join(map(str, (*_READ, FORMAT)))
         raise UserError(f"{where}: format_version is {version!r}, this version reads {known}; {_AGAIN}")
     return _record(Diagnosis, row, where)
+
+
+def renamed(value: Any, names: Mapping[str, str], plain: Collection[str] = ()) -> Any:
+    """What a file of a former format holds, under the keys of the present one.
+
+    Args:
+        names: present keys by former ones.
+        plain: keys whose values have keys that are no fields.
+    """
+    if isinstance(value, list):
+        return [renamed(one, names, plain) for one in value]
+    if not isinstance(value, Mapping):
+        return value
+    return {names.get(key, key): one if key in plain else renamed(one, names, plain) for key, one in value.items()}
 
 
 def _encoded(value: object) -> object:

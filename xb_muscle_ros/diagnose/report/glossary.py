@@ -11,12 +11,7 @@ import yaml
 
 
 class Term(NamedTuple):
-    """One entry.
-
-    Attributes:
-        title: as the glossary lists it.
-        text: a sentence or two.
-    """
+    """One entry: a title, and a sentence or two."""
 
     title: str
     text: str

@@ -13,8 +13,8 @@ import jinja2
 from jinja2.filters import do_forceescape, do_mark_safe
 
 from xb_muscle_ros.diagnose.component import NAMED
-from xb_muscle_ros.diagnose.report import figures
 from xb_muscle_ros.diagnose.report import phrases as say
+from xb_muscle_ros.diagnose.report.figures import FIGURES
 from xb_muscle_ros.diagnose.report.figures.common import trial_labels
 from xb_muscle_ros.diagnose.report.glossary import GLOSSARY
 from xb_muscle_ros.diagnose.report.prose import headline, summary
@@ -35,12 +35,7 @@ _LEAST = 0.05
 
 
 def as_html(d: Diagnosis, traces: Sequence[TrialTraces]) -> str:
-    """The report.
-
-    Args:
-        d: the diagnosis.
-        traces: of its trials; figures of forces show those that there are.
-    """
+    """The report; figures of forces show the trials of which there are traces."""
     page: str = _environment().get_template("page.html.j2").render(_context(d, traces))
     return page
 
@@ -101,15 +96,8 @@ def _context(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Any]:
 
 def _figures(d: Diagnosis, traces: Sequence[TrialTraces]) -> dict[str, Any]:
     """Figures that there are with their numbers, from 1 on in the order of the page, and data URIs."""
-    drawn = {
-        "before_after": figures.draw_before_after(d, traces),
-        "probabilities": figures.draw_probabilities(d),
-        "contributions": figures.draw_contributions(d, traces),
-        "fibres": figures.draw_fibres(d),
-        "map": figures.draw_map(d),
-        "laws": figures.draw_laws(d),
-    }
-    there = [(name, figure) for name, figure in drawn.items() if figure is not None]
+    drawn = ((name, draw(d, traces)) for name, draw in FIGURES.items())
+    there = [(name, figure) for name, figure in drawn if figure is not None]
     return {name: {"number": k, "source": _uri(f.svg), "figure": f} for k, (name, f) in enumerate(there, start=1)}
 
 

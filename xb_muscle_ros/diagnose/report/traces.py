@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import replaced
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 _WITHOUT = "without_"
 _AGAIN = "run xb_muscle diagnose again"
@@ -26,10 +24,7 @@ class TrialTraces:
     """One trial; arrays of shape (n,), lengths in L0, forces in F0.
 
     Attributes:
-        fibre, trial: which; as in `result.OfTrial`.
         time_s: of the measured samples, s.
-        length_l0: length change.
-        measured_f0: measured force.
         start_f0: of the fibre file as given.
         before_f0, after_f0: base and answer, fitted to all trials.
         heldout_before_f0, heldout_after_f0: predicted by fits that did not see the trial's condition; None where none

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.diagnose.names import Name
+from xb_muscle_ros.diagnose.noise.closure import by_distribution, has_closure
 from xb_muscle_ros.diagnose.search.whole import FRAMES, beside, whole
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.problem import Problem
@@ -37,8 +38,6 @@ def compile_task(task: Mapping[str, Any]) -> bool:
 
 def compile_first(fibres: Sequence[Fibre], options: Options) -> None:
     """Compile what a diagnosis of these fibres needs and the cache does not have, on all cores."""
-    from xb_muscle_ros.diagnose.noise.closure import by_distribution, has_closure
-
     wanted: dict[tuple[str, str], Fibre] = {}
     for fibre in fibres:
         frames: list[tuple[Name, ...]] = [(), *((n,) for n in FRAMES if n in beside(fibre))]

@@ -15,13 +15,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.diagnose.search.system import Names, System, ordered
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.training import Training
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Longest move of a step: of a logarithm, and of others in units of their prior's standard deviation.
 _LONGEST_LOG, _LONGEST_SD = 1.0, 3.0
@@ -33,13 +31,11 @@ class Fit:
     """The best point found of a set in one fibre.
 
     Attributes:
-        names: of the set.
         values: of all coordinates by label, in their units.
         mean_square_f0: of the residuals, weighted, F0².
         prior: half the squared distance from the priors and from features, in standard deviations.
         occam: half the logarithm of how many times narrower the posterior is than the priors (Laplace).
         sds: posterior standard deviation of every coordinate by label, on the moved scale (logarithms where fitted so).
-        rmsd_f0: root of `mean_square_f0`, F0.
         simulated: simulations of all trials that it took.
     """
 
@@ -62,12 +58,12 @@ class Fit:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
-        return {**self.__dict__, "names": [n.value for n in self.names]}
+        return {**self.__dict__, "names": list(self.names)}
 
     @staticmethod
     def from_json(row: Mapping[str, Any]) -> Fit:
         """From plain data."""
-        return Fit(**{**row, "names": ordered([Name(n) for n in row["names"]])})
+        return Fit(**{**row, "names": ordered(row["names"])})
 
 
 @dataclass
@@ -75,7 +71,6 @@ class Point:
     """A point of a problem with its residuals.
 
     Attributes:
-        z: on the moved scale.
         residual: simulated less measured force, F0.
         mean_square: weighted, F0².
         prior, feature: distances from the priors and from the features, in standard deviations.
@@ -158,7 +153,6 @@ class Descent:
 
         Args:
             z: start on the moved scale.
-            most: Jacobians at most.
             tolerance: fall of the cost at which to stop, in its own unit.
             slopes: at the start, where they are known.
 
@@ -250,12 +244,12 @@ class Descent:
 def fit_task(task: Mapping[str, Any]) -> dict[str, Any] | None:
     """Fit a set from the best of several starts; None where the model has no solution at any."""
     system = System.from_json(task["system"])
-    found = fitted(system, [Name(n) for n in task["names"]], task["starts"], task["most"], task["tolerance"])
+    found = fitted(system, task["names"], task["starts"], task["most"], task["tolerance"])
     return None if found is None else found.to_json()
 
 
 def fitted(
-    system: System, names: Collection[Name], starts: Sequence[Mapping[str, float]], most: int, tolerance: float
+    system: System, names: Collection[str], starts: Sequence[Mapping[str, float]], most: int, tolerance: float
 ) -> Fit | None:
     """Fit a set from the best of several starts; None where the model has no solution at any."""
     begun: list[tuple[float, Descent, Array, Array | None]] = []

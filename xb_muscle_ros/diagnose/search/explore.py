@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.answers import NAMES
+from xb_muscle_ros.diagnose.effort import Effort
 from xb_muscle_ros.diagnose.inference.population import Estimate, adjustment
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
 from xb_muscle_ros.diagnose.search.descent import Fit, fit_task
@@ -18,8 +18,6 @@ from xb_muscle_ros.diagnose.search.whole import beside, together
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.work import Options, run
-
-Array = npt.NDArray[np.float64]
 
 # Chance, before anything is seen, that a mechanism is part of the truth, or an artefact beyond the ordinary.
 _PRIOR_ODDS = {True: np.log(0.1), False: np.log(0.05)}
@@ -31,28 +29,6 @@ _PATIENCE = 3.0
 FORM = 0.12
 # Of a set whose curvature is not known.
 _NONE = -1e9
-
-
-@dataclass(frozen=True)
-class Effort:
-    """How hard to look.
-
-    Attributes:
-        steps: names in a set at most.
-        candidates: fitted at each step, the most promising first.
-        rivals: fitted in the place of each name of the best set.
-        most: Jacobians of a fit.
-        tolerance: fall of the cost at which a fit stops.
-    """
-
-    steps: int = 6
-    candidates: int = 6
-    rivals: int = 4
-    most: int = 10
-    tolerance: float = 0.02
-
-
-QUICK: Effort = Effort(steps=5, candidates=4, rivals=2, most=5, tolerance=0.1)
 
 
 def spread(system: System) -> list[dict[str, float]]:
@@ -93,7 +69,7 @@ class Explorer:
         tasks = [
             {
                 "system": plain,
-                "names": [n.value for n in names],
+                "names": list(names),
                 "starts": [dict(s) for s in of_fibre],
                 "most": self.effort.most,
                 "tolerance": self.effort.tolerance,
@@ -130,8 +106,8 @@ class Explorer:
         if names not in self._estimates:
             fits = self.fits[names]
             own = [n for n in names if n not in MEASUREMENT]
-            effects = {CATALOGUE[n.value].effect for n in own}
-            labels = dict.fromkeys(label for n in own for label in CATALOGUE[n.value].parameters)
+            effects = {CATALOGUE[n].effect for n in own}
+            labels = dict.fromkeys(label for n in own for label in CATALOGUE[n].parameters)
             found: dict[str, list[Estimate]] = {label: [] for label in labels}
             for system, fit in zip(self.systems, fits, strict=True):
                 coordinates = {c.label: c for c in system.problem(names, fit.values).coordinates}
@@ -142,13 +118,12 @@ class Explorer:
             self._estimates[names] = found
         return self._estimates[names]
 
-    def adjusted(self, names: Names, fibres: Sequence[int] | None = None) -> float:
-        """What it adds to the evidence that effects are mostly small, and alike in all fibres."""
-        chosen = tuple(range(len(self.systems)) if fibres is None else fibres)
-        key = names, chosen
+    def adjusted(self, names: Names, fibres: Sequence[int]) -> float:
+        """What it adds to the evidence that effects are mostly small, and alike in these fibres."""
+        key = names, tuple(fibres)
         if key not in self._adjusted:
             rows = self.estimates(names).values()
-            self._adjusted[key] = sum(adjustment([row[i] for i in chosen]) for row in rows)
+            self._adjusted[key] = sum(adjustment([row[i] for i in fibres]) for row in rows)
         return self._adjusted[key]
 
     @staticmethod
@@ -202,7 +177,7 @@ class Explorer:
         """Where the fit of a candidate starts in every fibre."""
         if not np.isnan(promised[0].gain):
             return [[*p.starts] for p in promised]
-        catalogue = CATALOGUE[promised[0].name.value]
+        catalogue = CATALOGUE[promised[0].name]
         return [
             [*p.starts, *catalogue.starting_values(s.fibre.values)] for p, s in zip(promised, self.systems, strict=True)
         ]

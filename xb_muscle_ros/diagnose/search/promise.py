@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.answers import MECHANISMS
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
@@ -16,8 +15,7 @@ from xb_muscle_ros.fit.linear_fit import LinearFit
 from xb_muscle_ros.fit.training import Training
 from xb_muscle_ros.measurement.artefacts import ORDINARY
 from xb_muscle_ros.models.catalogue import CATALOGUE
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # A mechanism's line is followed this far either way, in units of its start, where the fit begins.
 _LEAST_SHARE, _MOST_SHARE = 0.1, 8.0
@@ -29,7 +27,6 @@ class Promise(NamedTuple):
     """Of one candidate in one fibre.
 
     Attributes:
-        name: of it.
         gain: fall of the cost along its line, profiled over all else; nan where only a fit can tell.
         starts: values by label from which its fit may start.
         mean_square_f0: of the residuals there, F0²; nan where only a fit can tell.
@@ -99,7 +96,7 @@ def promise(linear: Linear, name: Name) -> Promise:
     if name in MEASUREMENT:
         return _of_artefact(linear, name)
     system, fit = linear.system, linear.fit
-    entry = CATALOGUE[name.value]
+    entry = CATALOGUE[name]
     starts = [dict(s) for s in entry.starting_values(system.fibre.values)]
     if name in BLIND:
         return Promise(name, np.nan, tuple({**fit.values, **s} for s in starts), np.nan)
@@ -128,18 +125,18 @@ def promise(linear: Linear, name: Name) -> Promise:
 
 def _of_artefact(linear: Linear, name: Name) -> Promise:
     system, fit = linear.system, linear.fit
-    if name.value in ORDINARY:
+    if name in ORDINARY:
         own = linear.descent.information.copy()
-        mine = [j for j, c in enumerate(linear.descent.problem.coordinates) if c.name == name.value]
+        mine = [j for j, c in enumerate(linear.descent.problem.coordinates) if c.name == name]
         own[mine] /= BEYOND**2
         moves, _, gain, mean_square = linear.solve(np.empty((linear.force.size, 0)), np.empty(0), np.empty(0), own)
         # What the fit pays already for an error that is larger than ordinary.
         released = 0.5 * (1.0 - BEYOND**-2.0) * float(np.sum(linear.point.prior[mine] ** 2))
         return Promise(name, gain + released, (linear.values(moves),), mean_square)
     problem = system.problem((*fit.names, name), fit.values)
-    mine = [j for j, c in enumerate(problem.coordinates) if c.name == name.value]
+    mine = [j for j, c in enumerate(problem.coordinates) if c.name == name]
     columns, _ = Training(problem).slopes_by(problem.start, mine)
-    information = np.full(len(mine), (BEYOND * system.error_sd(name.value)) ** -2.0)
+    information = np.full(len(mine), (BEYOND * system.error_sd(name)) ** -2.0)
     moves, found, gain, mean_square = linear.solve(columns, information, np.zeros(len(mine)))
     values = {problem.coordinates[j].label: float(v) for j, v in zip(mine, found, strict=True)}
     return Promise(name, gain, ({**linear.values(moves), **values},), mean_square)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.answers import NAMES
 from xb_muscle_ros.diagnose.names import MEASUREMENT, Name
@@ -22,19 +21,22 @@ from xb_muscle_ros.measurement.artefacts import ARTEFACTS, ORDINARY
 from xb_muscle_ros.mechanisms import Entry
 from xb_muscle_ros.models.catalogue import CATALOGUE
 from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.parameters import PARAMETERS
+from xb_muscle_ros.trials.trial import Array
 
-Array = npt.NDArray[np.float64]
 Names = tuple[Name, ...]
 
 SATURATING = f"pCa {F0_ANCHOR.pca:g}"
 """Solution whose isometric force is F0."""
 # Residuals that count as independent resemble each other still: a misfit lasts as long as its phase.
 INDEPENDENT = 0.6
+# A value this near a bound, as a share of the way between bounds, ended there.
+_AT_BOUND = 1e-3
 BEYOND = 6.0
 """An artefact that is named may be so much larger than an ordinary one."""
 
 
-def ordered(names: Collection[Name]) -> Names:
+def ordered(names: Collection[str]) -> Names:
     """Names of a set in their usual order, each once."""
     return tuple(name for name in NAMES if name in set(names))
 
@@ -44,9 +46,9 @@ def without(names: Names, name: Name) -> Names:
     return tuple(n for n in names if n is not name)
 
 
-def label(names: Collection[Name]) -> str:
+def label(names: Collection[str]) -> str:
     """A set for people and files."""
-    return " + ".join(name.value for name in ordered(names)) or "base"
+    return " + ".join(ordered(names)) or "base"
 
 
 @dataclass(frozen=True)
@@ -110,11 +112,10 @@ class System:
             made = replace(made, features=(*self.features, F0_ANCHOR))
         return made
 
-    def problem(self, names: Collection[Name], values: Mapping[str, float]) -> Problem:
+    def problem(self, names: Collection[str], values: Mapping[str, float]) -> Problem:
         """The fit of a set.
 
         Args:
-            names: of the set.
             values: by label of coordinate, for those that are not to start as the fibre or the catalogue says; those
                 of mechanisms that are not in the set are left alone.
         """
@@ -123,7 +124,7 @@ class System:
         present = dict(fibre.values)
         coordinates = [c for c in parameter_coordinates(self.fibre, None, (), {}, {}) if c.name in present]
         for name in (n for n in names if n not in MEASUREMENT):
-            entry = CATALOGUE[name.value]
+            entry = CATALOGUE[name]
             start = entry.starting_values(self.fibre.values)[0]
             # What the catalogue starts from besides what is fitted, such as a rate of rebinding.
             present |= {n: float(v) for n, v in start.items() if n in present}
@@ -143,7 +144,7 @@ class System:
 
     def _artefacts(self, names: Names) -> list[Coordinate]:
         """Ordinary measurement errors, wider where named, and those that are in a set only."""
-        named = {n.value for n in names if n in MEASUREMENT}
+        named: set[str] = {n for n in names if n in MEASUREMENT}
         wanted = [n for n in ARTEFACTS if n in ORDINARY or n in named]
         sds = {**self.error_sds, **{n: BEYOND * self.error_sd(n) for n in named}}
         trials, solutions = [t.name for t in self.trials], [t.solution for t in self.trials]
@@ -170,10 +171,14 @@ class System:
         )
 
 
+def at_bound(c: Coordinate, z: float) -> bool:
+    """Whether a coordinate's value on the moved scale ended at a bound."""
+    low, high = c.inward(c.lower), c.inward(c.upper)
+    return not _AT_BOUND * (high - low) < z - low < (1.0 - _AT_BOUND) * (high - low)
+
+
 def _usual(parameter: str) -> float:
     """Value of a parameter that switches a block on."""
-    from xb_muscle_ros.models.parameters import PARAMETERS
-
     default = PARAMETERS[parameter].default
     assert default is not None
     return float(default)

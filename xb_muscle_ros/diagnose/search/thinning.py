@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.fit.data import FitTrial
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Steps begin so short after a corner and grow by this share of the time since.
 _SHORTEST_S, _GROWTH = 0.001, 0.12
@@ -44,8 +43,7 @@ def thinned(trial: FitTrial) -> Thinned:
     first, last = trial.force_time_s[0], trial.force_time_s[-1]
     # A sample belongs to the step that it ends; those before the first step to the first.
     bins = np.clip(np.searchsorted(edges, trial.force_time_s, side="left"), 1, edges.size - 1)
-    which, starts, counts = np.unique(bins, return_index=True, return_counts=True)
-    del which
+    _, starts, counts = np.unique(bins, return_index=True, return_counts=True)
     time_s = np.add.reduceat(trial.force_time_s, starts) / counts
     force = np.add.reduceat(trial.measured_f0, starts) / counts
     step_s = (last - first) / max(trial.force_time_s.size - 1, 1)

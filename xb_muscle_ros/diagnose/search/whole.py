@@ -33,7 +33,7 @@ def beside(fibre: Fibre) -> tuple[Name, ...]:
 @functools.cache
 def _goes(model: str, names: tuple[Name, ...]) -> bool:
     try:
-        row_of(model_of_set(with_mechanisms(model, *(n.value for n in names))))
+        row_of(model_of_set(with_mechanisms(model, *names)))
     except UserError:
         return False
     return True
@@ -55,7 +55,6 @@ def whole(fibre: Fibre, frame: Sequence[Name]) -> Fibre:
 
     Args:
         fibre: as given; its own mechanisms stay.
-        frame: see `FRAMES`.
 
     Raises:
         UserError: a frame that does not go with the model.
@@ -64,11 +63,11 @@ def whole(fibre: Fibre, frame: Sequence[Name]) -> Fibre:
     for name in MECHANISMS:
         if name not in FRAMES and _goes(fibre.model, (*named, name)):
             named.append(name)
-    model = with_mechanisms(fibre.model, *(n.value for n in named))
+    model = with_mechanisms(fibre.model, *named)
     needed = {row.name for row in compose(model, fibre.method).parameters}
     values = {key: value for key, value in fibre.values.items() if key in needed}
     for name in named:
-        for key, value in CATALOGUE[name.value].starting_values(fibre.values)[0].items():
+        for key, value in CATALOGUE[name].starting_values(fibre.values)[0].items():
             if key in needed:
                 values.setdefault(key, value)
         if name not in frame:
@@ -82,10 +81,8 @@ def only(fibre: Fibre, given: Fibre, names: Sequence[Name]) -> Fibre:
 
     Args:
         fibre: whole, with fitted values.
-        given: the fibre as it was given.
-        names: mechanisms that are there.
     """
-    model = with_mechanisms(given.model, *(n.value for n in names))
+    model = with_mechanisms(given.model, *names)
     needed = [row.name for row in compose(model, given.method).parameters]
     values = {key: fibre.values[key] for key in needed if key in fibre.values}
     full = complete(values, model_of_set(model), f"fibre {given.name}, model {model}", given.method)

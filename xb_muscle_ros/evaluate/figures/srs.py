@@ -14,8 +14,8 @@ from xb_muscle_ros.evaluate.srs_scores import READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable, place
 from xb_muscle_ros.models.titles import title_of
 from xb_muscle_ros.plotting.style import figure, save
-from xb_muscle_ros.scores.activation import CLASSES, activation_class
 from xb_muscle_ros.scores.conditions import (
+    CLASSES,
     COMMON_AMPLITUDE_L0,
     COMMON_CLASS,
     COMMON_RECOVERY_S,
@@ -23,6 +23,7 @@ from xb_muscle_ros.scores.conditions import (
     LARGE_BELOW_S,
     RECOVERIES_S,
     SETS,
+    activation_class,
 )
 from xb_muscle_ros.scores.relative import nanmean, nansd
 from xb_muscle_ros.trials.trial import Array
@@ -87,7 +88,6 @@ def draw_srs(path: Path, data: SrsTable, tables: Mapping[str, SrsTable], section
     with the s.d. over fibres.
 
     Args:
-        path: of the PNG.
         data: measured SRS.
         tables: simulated SRS by model.
         section: ``srs`` of ``evaluate.json``.

@@ -12,8 +12,7 @@ from xb_muscle_ros.evaluate.srs_scores import READINGS
 from xb_muscle_ros.evaluate.srs_table import SrsTable
 from xb_muscle_ros.models.titles import title_of
 from xb_muscle_ros.plotting.style import figure, save
-from xb_muscle_ros.scores.activation import CLASSES
-from xb_muscle_ros.scores.conditions import Mask
+from xb_muscle_ros.scores.conditions import CLASSES, Mask
 from xb_muscle_ros.scores.relative import nanmean
 from xb_muscle_ros.trials.trial import Array
 

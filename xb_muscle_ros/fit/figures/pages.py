@@ -13,7 +13,7 @@ from xb_muscle_ros.fit.figures.profiles import draw_profiles
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.run import Fitted
 from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure, save
-from xb_muscle_ros.plotting.trial_pages import Look, pages_of, panels, size_mm
+from xb_muscle_ros.plotting.trial_pages import Look, draw_pages
 
 _PER_PAGE = 12
 _LOOK = Look((3, 1), 0.08, "Force (F$_0$)", "Residual\n(% F$_0$)", row_mm=62.0, extra_mm=14.0)
@@ -37,8 +37,6 @@ def draw(folder: Path, fitted: Fitted, found: Mapping[str, Any]) -> list[Path]:
 
     Args:
         folder: where ``trials.png``, ``profiles.png`` and ``correlation.png`` go, each with a PDF beside it.
-        fitted: the fit.
-        found: of `fit.report.as_json`.
 
     Returns:
         paths of the PNG files.
@@ -56,19 +54,11 @@ def draw(folder: Path, fitted: Fitted, found: Mapping[str, Any]) -> list[Path]:
 def _trials(path: Path, fitted: Fitted) -> list[Path]:
     """Pages of at most twelve trials: measured force, the start's and the fitted model's, and what is left between."""
     trials = fitted.problem.trials
-    pages = []
-    for here, chosen in pages_of(path, len(trials), _PER_PAGE):
-        shown = trials[chosen]
-        with figure(*size_mm(len(shown), _LOOK)) as made:
-            handles: list[Any] = []
-            for (upper, lower), trial in zip(panels(made, len(shown), _LOOK), shown, strict=True):
-                handles = _panel(upper, lower, fitted, trial)
-            # One panel is narrower than all names side by side.
-            columns = len(handles) if len(shown) > 1 else 2
-            made.legend(handles=handles, loc="outside upper center", ncols=columns, frameon=False)
-            save(made, here)
-        pages.append(here)
-    return pages
+
+    def draw(upper: Any, lower: Any, i: int) -> list[Any]:
+        return _panel(upper, lower, fitted, trials[i])
+
+    return draw_pages(path, len(trials), _PER_PAGE, _LOOK, draw, 2)
 
 
 def _panel(upper: Any, lower: Any, fitted: Fitted, trial: Any) -> list[Any]:

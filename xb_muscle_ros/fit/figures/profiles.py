@@ -30,15 +30,7 @@ _LONGEST_LABEL = 22
 
 
 def draw_profiles(path: Path, found: Mapping[str, Any]) -> Path:
-    """Draw a panel for each profiled parameter.
-
-    Args:
-        path: of the PNG; a PDF goes beside it.
-        found: of `fit.report.as_json`, with profiles.
-
-    Returns:
-        the path.
-    """
+    """Draw a panel for each profiled parameter into a PNG, and a PDF beside it; returns the path."""
     rows = [row for row in found["parameters"] if "profile" in row]
     columns = min(_COLUMNS, len(rows))
     lines = -(-len(rows) // columns)
@@ -72,9 +64,7 @@ def _panel(axes: Any, row: Mapping[str, Any], limit: float, limit_name: str) -> 
     (handles["profile"],) = axes.plot(x, root, color=MODEL, marker="o", markersize=3, zorder=3)
     handles[limit_name] = axes.axhline(limit, color="black", linewidth=0.6, linestyle=":", zorder=1)
     for end, what in zip(row["interval"], row["interval_ended_by"], strict=True):
-        label = (
-            "end by the data" if what == BY_DATA else "end by the prior" if what == PRIOR else "open: a bound or none"
-        )
+        label = _ENDS.get(what, "open: a bound or none")
         handles[label] = axes.axvline(end, color=SECOND, linewidth=0.9, linestyle=_STYLES.get(what, _OPEN), zorder=2)
     handles["start (arrow: beyond the axis)"] = _start(axes, float(row["start"]), low, high)
     scale(axes, low, high)

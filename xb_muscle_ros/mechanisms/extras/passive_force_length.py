@@ -4,16 +4,17 @@ from xb_muscle_ros.mechanisms import Expr, Extra, Needs, Parameter, Quantities, 
 from xb_muscle_ros.mechanisms.extras.active_force_length import FL_MAX, FL_OPTIMUM
 
 FP_MAX = Parameter(
-    "fp_max", "F0", "passive force of half-sarcomeres at the length fl_max", 0.0, 100.0, 1.3,
-    "MuJoCo, 'Muscle actuators' (fpmax)",
+    "fp_max", "F0", "passive force of half-sarcomeres three quarters of the way from their optimum to fl_max", 0.0,
+    100.0, 1.3, "MuJoCo 3, mju_muscleBias (fpmax)",
 )  # fmt: skip
 
 
 class PassiveForceLength(Extra):
-    """F = fp_max/4 (w³ + 3 (y - 1)+) with w = min(y, 1): a cubic up to y = 1, then its tangent.
+    """F = fp_max (w²/2 + (y - 1)+) with w = min(y, 1): a parabola up to y = 1, then its tangent.
 
     y is 2 (L - 1)+/(fl_max - 1), with L = 1 + ΔS - fl_optimum and ΔS the half-sarcomeres' length change. Beside the
-    heads and within the half-sarcomeres, it stretches the series element as they do.
+    heads and within the half-sarcomeres, it stretches the series element as they do. The curve is that of MuJoCo's
+    engine, which has 1.5 fp_max at fl_max.
     """
 
     name = "passive_force_length"
@@ -23,11 +24,11 @@ class PassiveForceLength(Extra):
 
     def inner_force(self, q: Quantities) -> Expr:
         _, w, beyond = self._stretch(q)
-        return q.fp_max / (4 * q.Fscale) * (w**3 + 3 * beyond)
+        return q.fp_max / q.Fscale * (w**2 / 2 + beyond)
 
     def inner_kinetics(self, q: Quantities) -> tuple[Expr, Expr]:
         per_length, w, _ = self._stretch(q)
-        return 0, 3 * q.fp_max / (4 * q.Fscale) * w**2 * per_length / q.gamma
+        return 0, q.fp_max / q.Fscale * w * per_length / q.gamma
 
     def _stretch(self, q: Quantities) -> tuple[Expr, Expr, Expr]:
         """Of y: its change per L0, its part up to 1, and what is beyond."""

@@ -8,14 +8,12 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import lfilter
 
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.prove.generator.study import Planned
 from xb_muscle_ros.prove.generator.world import SAMPLE_S, Stimulus
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 
 @dataclass(frozen=True)
@@ -78,41 +76,25 @@ class Size(NamedTuple):
     most: float
 
 
-PRIORS: Mapping[str, Size] = MappingProxyType(
-    {
-        Name.PCA_SHIFT.value: Size(0.05, 1.2, 3.0),
-        Name.RUN_DOWN.value: Size(0.01, 1.5, 5.0),
-        Name.FORCE_OFFSET.value: Size(0.005, 2.0, 6.0),
-        Name.FORCE_DRIFT.value: Size(0.002, 3.0, 12.0),
-        Name.LENGTH_GAIN.value: Size(0.02, 2.0, 6.0),
-        Name.TIME_SHIFT.value: Size(5e-4, 2.0, 8.0),
-        Name.TRANSDUCER_LAG.value: Size(5e-4, 2.0, 8.0),
-    }
-)
+_SIZES = {
+    Name.PCA_SHIFT: (Size(0.05, 1.2, 3.0), Size(0.04, 3.0, 6.0)),
+    Name.RUN_DOWN: (Size(0.01, 1.5, 5.0), Size(0.003, 3.0, 7.0)),
+    Name.FORCE_OFFSET: (Size(0.005, 2.0, 6.0), Size(0.003, 3.0, 8.0)),
+    Name.FORCE_DRIFT: (Size(0.002, 3.0, 12.0), Size(0.002, 3.0, 10.0)),
+    Name.LENGTH_GAIN: (Size(0.02, 2.0, 6.0), Size(0.01, 4.0, 10.0)),
+    Name.TIME_SHIFT: (Size(5e-4, 2.0, 8.0), Size(7e-4, 3.0, 6.0)),
+    Name.TRANSDUCER_LAG: (Size(5e-4, 2.0, 8.0), Size(7e-4, 3.0, 6.0)),
+}
+PRIORS: Mapping[str, Size] = MappingProxyType({name: of_single for name, (of_single, _) in _SIZES.items()})
 """Of singles, by name: one prior SD, and how many SDs an artefact has."""
+ARTEFACTS: Mapping[str, Size] = MappingProxyType({name: of_composite for name, (_, of_composite) in _SIZES.items()})
+"""Of composites, by name."""
+# A drift and a lag are no part of a careful study.
 ORDINARY: Mapping[str, float] = MappingProxyType(
-    {
-        Name.PCA_SHIFT.value: 0.04,
-        Name.RUN_DOWN.value: 0.003,
-        Name.FORCE_OFFSET.value: 0.003,
-        Name.LENGTH_GAIN.value: 0.01,
-        Name.TIME_SHIFT.value: 7e-4,
-    }
+    {name: size.ordinary for name, size in ARTEFACTS.items() if name not in (Name.FORCE_DRIFT, Name.TRANSDUCER_LAG)}
 )
 """Size of every ordinary artefact: SD of pCa of a solution, of the offset of a trial (F0), of a study's length gain and
 time shift (s); the most that run-down takes of the force from trial to trial."""
-ARTEFACTS: Mapping[str, Size] = MappingProxyType(
-    {
-        Name.PCA_SHIFT.value: Size(ORDINARY[Name.PCA_SHIFT.value], 3.0, 6.0),
-        Name.RUN_DOWN.value: Size(ORDINARY[Name.RUN_DOWN.value], 3.0, 7.0),
-        Name.FORCE_OFFSET.value: Size(ORDINARY[Name.FORCE_OFFSET.value], 3.0, 8.0),
-        Name.FORCE_DRIFT.value: Size(0.002, 3.0, 10.0),
-        Name.LENGTH_GAIN.value: Size(ORDINARY[Name.LENGTH_GAIN.value], 4.0, 10.0),
-        Name.TIME_SHIFT.value: Size(ORDINARY[Name.TIME_SHIFT.value], 3.0, 6.0),
-        Name.TRANSDUCER_LAG.value: Size(7e-4, 3.0, 6.0),
-    }
-)
-"""Of composites, by name."""
 # Nobody keeps a fibre that has lost more of its force than this.
 _LOST = 0.3
 
@@ -121,11 +103,11 @@ def draw_ordinary(random: np.random.Generator, study: Sequence[Planned]) -> Arte
     """Artefacts as any careful study has them."""
     solutions = sorted({trial.pca for trial in study})
     return Artefacts(
-        pca_shift={pca: float(random.normal(0.0, ORDINARY[Name.PCA_SHIFT.value])) for pca in solutions},
-        length_gain=float(random.normal(0.0, ORDINARY[Name.LENGTH_GAIN.value])),
-        run_down=float(random.uniform(0.0, ORDINARY[Name.RUN_DOWN.value])),
-        force_offset=tuple(float(random.normal(0.0, ORDINARY[Name.FORCE_OFFSET.value])) for _ in study),
-        time_shift=float(random.normal(0.0, ORDINARY[Name.TIME_SHIFT.value])),
+        pca_shift={pca: float(random.normal(0.0, ORDINARY[Name.PCA_SHIFT])) for pca in solutions},
+        length_gain=float(random.normal(0.0, ORDINARY[Name.LENGTH_GAIN])),
+        run_down=float(random.uniform(0.0, ORDINARY[Name.RUN_DOWN])),
+        force_offset=tuple(float(random.normal(0.0, ORDINARY[Name.FORCE_OFFSET])) for _ in study),
+        time_shift=float(random.normal(0.0, ORDINARY[Name.TIME_SHIFT])),
     )
 
 
@@ -135,7 +117,7 @@ def draw_artefact(
     """An artefact of a size that is plausible and worth finding: alone, or in the place of an ordinary one."""
     alone, before = ordinary is None, ordinary or Artefacts()
     unit, least, most = (PRIORS if alone else ARTEFACTS)[name]
-    if name == Name.RUN_DOWN.value and not alone:
+    if name == Name.RUN_DOWN and not alone:
         most = max(min(most, _LOST / unit / (len(study) - 1)), least)
 
     def size() -> float:
@@ -144,12 +126,12 @@ def draw_artefact(
     def signed() -> float:
         return size() * float(random.choice([-1.0, 1.0]))
 
-    if name == Name.PCA_SHIFT.value:
+    if name == Name.PCA_SHIFT:
         between = sorted({trial.pca for trial in study if 4.5 < trial.pca < 9.0})
         count = int(random.integers(1, min(3, len(between)) + 1 if alone else 3))
         chosen = random.choice(between, count, replace=False)
         return replace(before, pca_shift={**before.pca_shift, **{float(pca): signed() for pca in chosen}})
-    if name == Name.FORCE_OFFSET.value:
+    if name == Name.FORCE_OFFSET:
         if alone:
             return replace(before, force_offset=tuple(signed() for _ in study))
         # Of some trials only, or of all.
@@ -157,9 +139,9 @@ def draw_artefact(
         moved = {int(i) for i in random.choice(len(study), count, replace=False)}
         offsets = tuple(signed() if i in moved else offset for i, offset in enumerate(before.force_offset))
         return replace(before, force_offset=offsets)
-    if name == Name.FORCE_DRIFT.value:
+    if name == Name.FORCE_DRIFT:
         return replace(before, force_drift=tuple(signed() for _ in study))
-    one_way = name in (Name.RUN_DOWN.value, Name.TRANSDUCER_LAG.value) or (alone and name == Name.TIME_SHIFT.value)
+    one_way = name in (Name.RUN_DOWN, Name.TRANSDUCER_LAG) or (alone and name == Name.TIME_SHIFT)
     value: dict[str, Any] = {name: size() if one_way else signed()}
     return replace(before, **value)
 

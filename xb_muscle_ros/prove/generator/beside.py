@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import lfilter
 
 from xb_muscle_ros.prove.generator.pieces import compiled
 from xb_muscle_ros.prove.generator.world import SAMPLE_S, Stimulus
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 
 def velocity(length: Array) -> Array:
@@ -17,9 +15,9 @@ def velocity(length: Array) -> Array:
     return np.diff(length, prepend=length[0]) / SAMPLE_S
 
 
-def saturating_drag(length: Array, drag_s: float, bend: float) -> Array:
+def saturating_drag(s: Stimulus, drag_s: float, bend: float) -> Array:
     """Drag that bends over: drag_s v/(1 + |v|/bend), bend in L0/s."""
-    v = velocity(length)
+    v = velocity(s.length)
     return drag_s * v / (1.0 + np.abs(v) / bend)
 
 
@@ -31,7 +29,7 @@ def leaky(drive: Array, tau_s: float) -> Array:
     return np.asarray(lfilter([tau_s * (1.0 - left)], [1.0, -left], driven))
 
 
-def power_law_relaxation(length: Array, stiffness: float, exponent: float, steepness: float) -> Array:
+def power_law_relaxation(s: Stimulus, stiffness: float, exponent: float, steepness: float) -> Array:
     """Four Maxwell arms whose springs stiffen exponentially; weights fall with the power `exponent` of their time.
 
     Args:
@@ -40,8 +38,8 @@ def power_law_relaxation(length: Array, stiffness: float, exponent: float, steep
     """
     times = np.array([0.01, 0.06, 0.4, 2.5])
     weights = times**-exponent / np.sum(times**-exponent)
-    v = velocity(length)
-    total = np.zeros(length.size)
+    v = velocity(s.length)
+    total = np.zeros(s.length.size)
     for tau, weight in zip(times, weights, strict=True):
         total += weight * np.expm1(steepness * leaky(v, tau)) / steepness
     return stiffness * total
@@ -82,21 +80,17 @@ def slipping_friction(length: Array, way: float, unevenness: float, release_s: f
     return total
 
 
-def calcium_share(calcium_um: float, half_pca: float, steepness: float) -> float:
-    """Share of sites on titin that calcium occupies."""
-    return float(1.0 / (1.0 + (10.0 ** (6.0 - half_pca) / calcium_um) ** steepness))
-
-
-def bound_titin(length: Array, share: float, stiffness: float, contour: float, rebind_s: float) -> Array:
+def bound_titin(s: Stimulus, stiffness: float, contour: float, rebind_s: float, half_pca: float, hill: float) -> Array:
     """Titin bound to actin where it was when the fibre was activated: a worm-like chain from there on.
 
     Shortening leaves it slack, and it binds anew, shorter, with the time constant `rebind_s`.
 
     Args:
-        share: of molecules bound.
-        stiffness: F0/L0 at small extension.
+        stiffness: F0/L0 at small extension, if calcium has bound to all molecules.
         contour: extension at which the chain is straight, L0.
+        half_pca, hill: see `_titin_share`.
     """
+    length = s.length
     anchor, force = length[0], np.zeros(length.size)
     left = np.exp(-SAMPLE_S / rebind_s)
     for k in range(length.size):
@@ -104,14 +98,15 @@ def bound_titin(length: Array, share: float, stiffness: float, contour: float, r
             anchor = length[k] + (anchor - length[k]) * left
         y = min(max(length[k] - anchor, 0.0) / contour, 0.95)
         force[k] = (0.25 / (1.0 - y) ** 2 - 0.25 + y) / 1.5 * contour
-    return share * stiffness * force
+    return _titin_share(s, half_pca, hill) * stiffness * force
 
 
-def stiffened_titin(length: Array, share: float, stiffness: float, steepness: float) -> Array:
+def stiffened_titin(s: Stimulus, stiffness: float, steepness: float, half_pca: float, hill: float) -> Array:
     """Exponential spring from rest length on, stiffer by the share of calcium that is bound."""
-    return np.asarray(share * stiffness * np.expm1(steepness * np.maximum(length, 0.0)) / steepness)
+    share = _titin_share(s, half_pca, hill)
+    return np.asarray(share * stiffness * np.expm1(steepness * np.maximum(s.length, 0.0)) / steepness)
 
 
-def titin_share(stimulus: Stimulus, shape: dict[str, float]) -> float:
-    """`calcium_share` by an effect's drawn constants."""
-    return calcium_share(stimulus.calcium, shape["half_pca"], shape["hill"])
+def _titin_share(s: Stimulus, half_pca: float, hill: float) -> float:
+    """Share of sites on titin that calcium occupies."""
+    return float(1.0 / (1.0 + (10.0 ** (6.0 - half_pca) / s.calcium) ** hill))

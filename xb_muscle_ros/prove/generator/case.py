@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.prove.generator.artefacts import Artefacts
@@ -18,9 +17,9 @@ from xb_muscle_ros.prove.generator.mix import Spec
 from xb_muscle_ros.prove.generator.noise import noise
 from xb_muscle_ros.prove.generator.study import Planned, plan
 from xb_muscle_ros.prove.generator.truth import Truth, study_forces, trial_force
-from xb_muscle_ros.prove.generator.world import Stimulus, World, isometric
+from xb_muscle_ros.prove.generator.world import Mesh, Stimulus, World, isometric
+from xb_muscle_ros.trials.trial import Array
 
-Array = npt.NDArray[np.float64]
 C = TypeVar("C", bound="Case")
 
 _ATTEMPTS = 40
@@ -56,12 +55,10 @@ class Case:
     """A finished case.
 
     Attributes:
-        spec: what it was to be.
         fibre, nominal: as in `Drawn`.
         values: the true constants.
         study: planned trials in the order of recording.
         concealed: effects, in the order of the spec.
-        artefacts: of the measurement.
         recorded: force as recorded, F0, noise and all, by trial.
         noise_sd: of each trial, F0.
         before: RMS difference to the base with the true constants, F0.
@@ -83,24 +80,29 @@ class Case:
         return {}
 
 
-def drawn_until(attempt: Callable[[np.random.Generator, int], C | None], spec: Spec, seed: int, number: int) -> C:
+def drawn_until(
+    attempt: Callable[[Drawn, np.random.Generator, int], C | None], spec: Spec, seed: int, number: int
+) -> C:
     """Draw until the fibre is one that a physiologist would have kept.
 
     Args:
-        attempt: a case of a draw and its number from 0 on; None where it is not usable.
+        attempt: a case of a fibre that was drawn, what draws, and the draw's number from 0 on; None where it is not
+            usable.
 
     Raises:
         UserError: none was found, which tells of a mix that cannot be made.
     """
     for k in range(_ATTEMPTS):
-        case = attempt(np.random.default_rng([seed, number, k + 1]), k)
+        random = np.random.default_rng([seed, number, k + 1])
+        found = _drawn(spec, random)
+        case = None if found is None else attempt(found, random, k)
         if case is not None:
             return case
     what = ", ".join([*spec.labels, *spec.artefacts]) or "null"
     raise UserError(f"case {number} ({what}, {spec.model}): no usable fibre in {_ATTEMPTS} draws; take another seed")
 
 
-def drawn(spec: Spec, random: np.random.Generator) -> Drawn | None:
+def _drawn(spec: Spec, random: np.random.Generator) -> Drawn | None:
     """A fibre with the effects of a spec; None where nobody would keep it for its force at full activation."""
     fibre = str(random.choice(fibres_with(spec.model)))
     given = nominal(fibre, spec.model)
@@ -146,9 +148,11 @@ def dressed(concealed: Sequence[Concealed], base: World) -> Truth:
     return truth
 
 
-def forces_of(concealed: Sequence[Concealed], base: World, stimuli: Sequence[Stimulus]) -> list[Array]:
+def forces_of(
+    concealed: Sequence[Concealed], base: World, stimuli: Sequence[Stimulus], mesh: Mesh | None = None
+) -> list[Array]:
     """Force of the fibre with its effects, F0, by trial."""
-    return study_forces(dressed(concealed, base), stimuli)
+    return study_forces(dressed(concealed, base), stimuli, mesh)
 
 
 def usable(study: Sequence[Planned], forces: Sequence[Array]) -> bool:
@@ -168,5 +172,5 @@ def rms(parts: Sequence[Array]) -> float:
 
 
 def trial_name(i: int) -> str:
-    """Name of trial i."""
+    """Name of trial i, from 0 on."""
     return f"trial_{i + 1:02d}"

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.diagnose.names import FAMILY, Name
+from xb_muscle_ros.diagnose.names import FAMILY
 from xb_muscle_ros.prove.generator.artefacts import Artefacts, draw_ordinary, with_artefacts
-from xb_muscle_ros.prove.generator.case import Case, drawn, drawn_until, forces_of, noises, planned, rms, usable
+from xb_muscle_ros.prove.generator.case import Case, Drawn, drawn_until, forces_of, noises, planned, rms, usable
 from xb_muscle_ros.prove.generator.composite_sizes import LEAST_F0, MOST_F0, Sized
 from xb_muscle_ros.prove.generator.effects import OUTSIDE
 from xb_muscle_ros.prove.generator.mix import ARTEFACT, Spec
@@ -26,7 +26,6 @@ class Composite(Case):
 
     Attributes:
         sizes: unique contribution of each effect, F0.
-        ordinary: artefacts that are ordinary.
         artefact_residual: RMS residual of artefacts beyond the ordinary, F0, and the largest prior residual of an
             ordinary one that they cause, in its SDs; None where there are none.
     """
@@ -39,7 +38,7 @@ class Composite(Case):
         """What the key says of composites alone."""
         effects = [
             {
-                **c._asdict(), "family": None if c.label in OUTSIDE else FAMILY[Name(c.label)], "asked_f0": asked,
+                **c._asdict(), "family": None if c.label in OUTSIDE else FAMILY[c.label], "asked_f0": asked,
                 "unique_contribution_f0": size,
             }
             for c, asked, size in zip(self.concealed, self.spec.sizes, self.sizes, strict=True)
@@ -57,14 +56,11 @@ class Composite(Case):
 
 def make_composite(spec: Spec, seed: int, number: int) -> Composite:
     """See `case.drawn_until`; in the first draws effects are of the sizes meant."""
-    return drawn_until(lambda random, k: _attempt(spec, random, k < _STRICT), spec, seed, number)
+    return drawn_until(lambda found, random, k: _attempt(spec, found, random, k < _STRICT), spec, seed, number)
 
 
-def _attempt(spec: Spec, random: np.random.Generator, strict: bool) -> Composite | None:
+def _attempt(spec: Spec, found: Drawn, random: np.random.Generator, strict: bool) -> Composite | None:
     """A case of one draw; None where it is not usable, or where `strict` and of another size than meant."""
-    found = drawn(spec, random)
-    if found is None:
-        return None
     base, concealed = found.base, found.concealed
     # Levels of calcium are chosen by what the fibre does, which its effects change; so perhaps twice.
     for _ in range(2):

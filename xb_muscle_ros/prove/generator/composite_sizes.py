@@ -2,36 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.prove.generator.artefacts import ORDINARY, Artefacts
-from xb_muscle_ros.prove.generator.case import Concealed, dressed, usable
+from xb_muscle_ros.prove.generator.case import Concealed, dressed, forces_of, usable
 from xb_muscle_ros.prove.generator.effects import EFFECTS
 from xb_muscle_ros.prove.generator.nuisances import artefact_columns
 from xb_muscle_ros.prove.generator.refit import Refit
 from xb_muscle_ros.prove.generator.rest import LinearFit, Rest
 from xb_muscle_ros.prove.generator.study import Planned
-from xb_muscle_ros.prove.generator.truth import study_forces
 from xb_muscle_ros.prove.generator.world import Mesh, Stimulus, World
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 LEAST_F0, MOST_F0 = 0.003, 0.05
 """Bounds of the unique contribution of an effect, F0."""
 # What one effect may change of the force before any refit (RMS), F0: more, and it is hardly one effect among others.
 _USUAL_CHANGE_F0 = 0.2
 # What stands in for a part of the base changes more.
-_CHANGE_F0 = {
-    name.value: 0.3
-    for name in (Name.SERIES_COMPLIANCE, Name.THIN_FILAMENT_COOPERATIVITY, Name.THICK_FILAMENT_COOPERATIVITY)
+_CHANGE_F0: Mapping[str, float] = {
+    Name.SERIES_COMPLIANCE: 0.3,
+    Name.THIN_FILAMENT_COOPERATIVITY: 0.3,
+    Name.THICK_FILAMENT_COOPERATIVITY: 0.3,
 }
 # Effects that are brief or weak need more than single ones do to be of any size; the change of force bounds them.
-_MORE = {Name.VISCOUS_DRAG.value: 2.0, Name.WEAKLY_BOUND_HEADS.value: 3.0}
+_MORE: Mapping[str, float] = {Name.VISCOUS_DRAG: 2.0, Name.WEAKLY_BOUND_HEADS: 3.0}
 # First-order refits leave so much more than true ones, and so much more yet for each other effect in the model.
 _LINEAR, _BESIDE = 1.7, 0.3
 # A scale that is to change by less than this is near enough.
@@ -44,6 +43,7 @@ _ROUGHLY, _WELL = 0, 6
 _WEAKER, _LESS = 4, 0.6
 # Steps of 1 ms are good to 0.05 % F0, the same with and without an effect.
 _COARSEST = Mesh(steps=1, dx=0.2, still=1e-5)
+_forces = functools.partial(forces_of, mesh=_COARSEST)
 
 
 class Sized:
@@ -70,9 +70,8 @@ class Sized:
 
     def of_artefacts(self, artefacts: Artefacts) -> LinearFit:
         """Residual of all that artefacts change beyond the ordinary ones, after a linear refit of the base."""
-        world = dressed([], self._base)
         both = [
-            [f.recorded(force, i) for i, force in enumerate(study_forces(world, f.given(self._study), _COARSEST))]
+            [f.recorded(force, i) for i, force in enumerate(_forces([], self._base, f.given(self._study)))]
             for f in (artefacts, self._ordinary)
         ]
         return self.plain.fit(np.concatenate(both[0]) - np.concatenate(both[1]))
@@ -139,7 +138,6 @@ class Sized:
         """What each effect leaves if the model has all others, and all that the model has is fitted again, F0.
 
         Args:
-            concealed: all effects.
             anew: how often refits may take their slopes anew.
         """
         data = self._force(concealed)
@@ -164,10 +162,7 @@ class Sized:
 
         def model(at: Array) -> Array:
             world, changed = there(at)
-            return (
-                np.concatenate(study_forces(dressed(changed, world), self.stimuli, _COARSEST))
-                + errors @ (at[coordinates:])
-            )
+            return np.concatenate(_forces(changed, world, self.stimuli)) + errors @ (at[coordinates:])
 
         def slopes(at: Array) -> Array:
             refit, scales = self._of_model(*there(at))
@@ -179,9 +174,7 @@ class Sized:
         """Slopes at a truth."""
         refit, scales = self._of_model(base, concealed)
         errors = artefact_columns(
-            lambda shift, gain: study_forces(
-                dressed(concealed, base), [_moved(s, shift, gain) for s in self.stimuli], _COARSEST
-            ),
+            lambda shift, gain: _forces(concealed, base, [_moved(s, shift, gain) for s in self.stimuli]),
             self._study, refit.plain(), ORDINARY,
         )  # fmt: skip
         return _Slopes(refit, np.column_stack([refit.jacobian, *scales, *errors]), refit.jacobian.shape[1])
@@ -193,12 +186,11 @@ class Sized:
         scales = []
         for i, c in enumerate(concealed):
             more = [*concealed[:i], c._replace(scale=1.05 * c.scale), *concealed[i + 1 :]]
-            moved = study_forces(dressed(more, base), self.stimuli, _COARSEST)
-            scales.append((np.concatenate(moved) - plain) / 0.05)
+            scales.append((np.concatenate(_forces(more, base, self.stimuli)) - plain) / 0.05)
         return refit, scales
 
     def _force(self, concealed: Sequence[Concealed]) -> Array:
-        return np.concatenate(study_forces(dressed(concealed, self._base), self.stimuli, _COARSEST))
+        return np.concatenate(_forces(concealed, self._base, self.stimuli))
 
     def _split(self, joined: Array) -> list[Array]:
         return np.split(joined, np.cumsum([s.length.size for s in self.stimuli])[:-1])
@@ -216,7 +208,6 @@ class _Slopes(NamedTuple):
     """Change of all forces, F0, by one prior SD of each coordinate.
 
     Attributes:
-        refit: of constants.
         columns: constants, logarithms of the effects' scales, ordinary artefacts; shape (samples, coordinates).
         constants: how many there are.
     """

@@ -8,15 +8,14 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.prove.generator import beside
 from xb_muscle_ros.prove.generator.layout import At, Series, Thick
 from xb_muscle_ros.prove.generator.truth import Truth
 from xb_muscle_ros.prove.generator.world import Acting, Stimulus
+from xb_muscle_ros.trials.trial import Array
 
-Array = npt.NDArray[np.float64]
 Shape = dict[str, float]
 
 _COMPLIANT = ("3state_coop", "2state_coop", "2state")
@@ -83,25 +82,9 @@ def _on_input(what: str, change: Callable[[Stimulus, float, Shape], Array]) -> C
     return apply
 
 
-def _beside(force: Callable[[Stimulus, float, Shape], Array]) -> Callable[[Truth, float, Shape], Truth]:
-    """An effect that is an element beside the heads, whose force is a function of the stimulus."""
-    return lambda truth, scale, shape: truth.adding(lambda stimulus, _: force(stimulus, scale, shape))
-
-
-def _drag(s: Stimulus, scale: float, shape: Shape) -> Array:
-    return beside.saturating_drag(s.length, scale, shape["bend"])
-
-
-def _viscoelastic(s: Stimulus, scale: float, shape: Shape) -> Array:
-    return beside.power_law_relaxation(s.length, scale, shape["exponent"], shape["steepness"])
-
-
-def _titin(s: Stimulus, scale: float, shape: Shape) -> Array:
-    return beside.bound_titin(s.length, beside.titin_share(s, shape), scale, shape["contour"], shape["rebind_s"])
-
-
-def _stiffened(s: Stimulus, scale: float, shape: Shape) -> Array:
-    return beside.stiffened_titin(s.length, beside.titin_share(s, shape), scale, shape["steepness"])
+def _beside(force: Callable[..., Array]) -> Callable[[Truth, float, Shape], Truth]:
+    """An effect that is an element beside the heads, whose force is a function of the stimulus, scale and form."""
+    return lambda truth, scale, shape: truth.adding(lambda stimulus, _: force(stimulus, scale, **shape))
 
 
 def _sensitivity(s: Stimulus, scale: float, shape: Shape) -> Array:
@@ -199,73 +182,76 @@ def _damaged(truth: Truth, scale: float, shape: Shape) -> Truth:
 
 _TITIN = {"half_pca": (6.0, 6.4), "hill": (2.0, 4.0)}
 _ROWS = (
-    Effect(Name.VISCOUS_DRAG.value, "drag at low speed, s", _ALL, 0.01, 0.1, _between(bend=(0.3, 2.0)), _beside(_drag)),
     Effect(
-        Name.PASSIVE_VISCOELASTICITY.value, "stiffness, F0/L0", _ALL, 1.0, 15.0,
-        _between(exponent=(0.1, 0.4), steepness=(10.0, 30.0)), _beside(_viscoelastic),
+        Name.VISCOUS_DRAG, "drag at low speed, s", _ALL, 0.01, 0.1, _between(bend=(0.3, 2.0)),
+        _beside(beside.saturating_drag),
     ),
     Effect(
-        Name.WEAKLY_BOUND_HEADS.value, "stiffness, cross-bridge force per power stroke", _ALL, 0.05, 0.5,
+        Name.PASSIVE_VISCOELASTICITY, "stiffness, F0/L0", _ALL, 1.0, 15.0,
+        _between(exponent=(0.1, 0.4), steepness=(10.0, 30.0)), _beside(beside.power_law_relaxation),
+    ),
+    Effect(
+        Name.WEAKLY_BOUND_HEADS, "stiffness, cross-bridge force per power stroke", _ALL, 0.05, 0.5,
         _between(rate=(100.0, 2000.0), strain=(2.0, 6.0), lag=(0.005, 0.02)),
         _set(At.WEAK_STIFFNESS, rate=At.WEAK_RATE, strain=At.WEAK_STRAIN, lag=At.WEAK_LAG),
     ),
     Effect(
-        Name.FILAMENT_FRICTION.value, "friction if all heads were bound, F0", _ALL, 0.5, 4.0,
+        Name.FILAMENT_FRICTION, "friction if all heads were bound, F0", _ALL, 0.5, 4.0,
         _between(way=(0.004, 0.02), unevenness=(0.1, 0.4), release_s=(0.01, 0.3)), _slipping,
     ),
     Effect(
-        Name.ACTIVE_TITIN.value, "stiffness when bound, F0/L0", _ALL, 2.0, 20.0,
-        _between(contour=(0.12, 0.25), rebind_s=(0.03, 0.3), **_TITIN), _beside(_titin),
+        Name.ACTIVE_TITIN, "stiffness when bound, F0/L0", _ALL, 2.0, 20.0,
+        _between(contour=(0.12, 0.25), rebind_s=(0.03, 0.3), **_TITIN), _beside(beside.bound_titin),
     ),
     Effect(
-        Name.STATIC_CALCIUM_STIFFNESS.value, "stiffness, F0/L0", _ALL, 2.0, 20.0,
-        _between(steepness=(5.0, 20.0), **_TITIN), _beside(_stiffened),
+        Name.STATIC_CALCIUM_STIFFNESS, "stiffness, F0/L0", _ALL, 2.0, 20.0,
+        _between(steepness=(5.0, 20.0), **_TITIN), _beside(beside.stiffened_titin),
     ),
     Effect(
-        Name.LENGTH_DEPENDENT_ACTIVATION.value, "pCa50 per length, 1/L0", _ALL, 1.5, 12.0, _between(),
+        Name.LENGTH_DEPENDENT_ACTIVATION, "pCa50 per length, 1/L0", _ALL, 1.5, 12.0, _between(),
         _on_input("calcium", _sensitivity),
     ),
     Effect(
-        Name.LATTICE_SPACING.value, "attachment per length at rest, 1/L0", _ALL, 2.0, 12.0, _between(best=(0.85, 0.95)),
+        Name.LATTICE_SPACING, "attachment per length at rest, 1/L0", _ALL, 2.0, 12.0, _between(best=(0.85, 0.95)),
         _set(At.LATTICE_SLOPE, best=At.LATTICE_BEST),
     ),
     Effect(
-        Name.FILAMENT_OVERLAP.value, "loss of overlap per length beyond the edge, 1/L0", _ALL, 1.5, 8.0,
+        Name.FILAMENT_OVERLAP, "loss of overlap per length beyond the edge, 1/L0", _ALL, 1.5, 8.0,
         _between(edge=(-0.03, 0.0)), _set(At.OVERLAP_SLOPE, edge=At.OVERLAP_EDGE),
     ),
     Effect(
-        Name.STRAIN_RECRUITED_HEADS.value, "J1's factor per length, 1/L0", ("3state_coop", "3state_coop_rigid"), 100.0,
+        Name.STRAIN_RECRUITED_HEADS, "J1's factor per length, 1/L0", ("3state_coop", "3state_coop_rigid"), 100.0,
         5000.0, _between(steepness=(5.0, 25.0), delay_s=(0.003, 0.02)), _on_input("recruitment", _recruited),
     ),
     Effect(
-        Name.PERSISTENT_THICK_FILAMENT.value, "logarithm of slowing, 1", ("3state_coop", "3state_coop_rigid"), 1.5, 4.0,
+        Name.PERSISTENT_THICK_FILAMENT, "logarithm of slowing, 1", ("3state_coop", "3state_coop_rigid"), 1.5, 4.0,
         _between(uneven=(0.85, 1.15)), _persistent,
     ),
     Effect(
-        Name.FORCIBLE_DETACHMENT.value, "rate of tearing off, 1/s", ("3state_coop", "2state_coop", "3state_coop_rigid"),
+        Name.FORCIBLE_DETACHMENT, "rate of tearing off, 1/s", ("3state_coop", "2state_coop", "3state_coop_rigid"),
         500.0, 6000.0, _between(strain=(1.0, 3.0), steepness=(4.0, 10.0), rebind=(500.0, 3000.0)),
         _set(At.TEAR_RATE, strain=At.TEAR_STRAIN, steepness=At.TEAR_STEEPNESS, rebind=At.REBIND_RATE),
     ),
-    Effect(Name.NONLINEAR_CROSSBRIDGE.value, "curvature, 1", _ALL, 0.1, 0.8, _between(), _set(At.HEAD_CURVATURE)),
-    Effect(Name.HALF_SARCOMERE_SPREAD.value, "SD of strength, 1", _COMPLIANT, 0.05, 0.2, _draw_spread, _spread),
+    Effect(Name.NONLINEAR_CROSSBRIDGE, "curvature, 1", _ALL, 0.1, 0.8, _between(), _set(At.HEAD_CURVATURE)),
+    Effect(Name.HALF_SARCOMERE_SPREAD, "SD of strength, 1", _COMPLIANT, 0.05, 0.2, _draw_spread, _spread),
     Effect(
-        Name.SERIES_COMPLIANCE.value, "length scale of the spring, power strokes",
+        Name.SERIES_COMPLIANCE, "length scale of the spring, power strokes",
         ("3state_coop_rigid", "2state_coop_rigid"), 1.0, 8.0, _between(force=(0.1, 0.4)), _compliance,
     ),
     Effect(
-        Name.THIN_FILAMENT_COOPERATIVITY.value, "affinity per bound head, decades", ("2state",), 0.5, 3.0, _between(),
+        Name.THIN_FILAMENT_COOPERATIVITY, "affinity per bound head, decades", ("2state",), 0.5, 3.0, _between(),
         _cooperative,
     ),
     Effect(
-        Name.THICK_FILAMENT_COOPERATIVITY.value, "J2, 1/s", ("2state_coop",), 40.0, 600.0,
+        Name.THICK_FILAMENT_COOPERATIVITY, "J2, 1/s", ("2state_coop",), 40.0, 600.0,
         _between(JF=(100.0, 500.0), half_force=(0.4, 1.2)), _regulated,
     ),
     Effect(
-        Name.TEMPERATURE.value, "change, °C", ("3state_coop", "2state_coop"), 4.0, 10.0, _between(sign=(-1.0, 1.0)),
+        Name.TEMPERATURE, "change, °C", ("3state_coop", "2state_coop"), 4.0, 10.0, _between(sign=(-1.0, 1.0)),
         _warm,
     ),
     Effect(
-        Name.PHOSPHATE.value, "detachment before the stroke, 1/s", ("3state_coop", "2state_coop"), 30.0, 400.0,
+        Name.PHOSPHATE, "detachment before the stroke, 1/s", ("3state_coop", "2state_coop"), 30.0, 400.0,
         _between(), _set(At.PHOSPHATE_RATE),
     ),
 )  # fmt: skip

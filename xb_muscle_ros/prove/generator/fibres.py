@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 
 import numpy as np
 import yaml
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.files import installed_folders
 
 # SD of the logarithm of a truth's constants around those of the file, at most; others are as in the file.
 _SPREAD = {
@@ -20,15 +19,6 @@ _LEAST_SPREAD = 0.6
 _KEPT = (*_SPREAD, "koff", "J1", "J2", "w", "k12", "Fpe0", "gamma", "Fscale")
 # Sets whose constants lie where no fibre does: no detachment on one side, or nearly no slope.
 _UNUSUAL = {("13Dec2017a", "2state"), ("12Dec2017a", "2state_coop"), ("19Dec2017a", "2state_coop")}
-
-
-def _folders() -> Iterator[Path]:
-    here = Path(__file__).resolve()
-    yield here.parents[3] / "config" / "fibers"
-    for parent in here.parents:
-        if parent.name in ("lib", "local"):
-            yield parent.parent / "share" / "xb_muscle_ros" / "config" / "fibers"
-    yield Path(sys.prefix) / "share" / "xb_muscle_ros" / "config" / "fibers"
 
 
 def fibres_with(model: str) -> list[str]:
@@ -83,7 +73,7 @@ _found: dict[str, dict[str, dict[str, float]]] = {}
 def _files() -> dict[str, dict[str, dict[str, float]]]:
     """Parameter sets of every fibre file, read once."""
     if not _found:
-        for folder in _folders():
+        for folder in installed_folders("config", "fibers"):
             for file in sorted(folder.glob("*.yaml")):
                 tree = yaml.safe_load(file.read_text(encoding="utf-8"))
                 _found.setdefault(file.stem, tree["/**"]["ros__parameters"]["models"])

@@ -10,7 +10,6 @@ less than a bin, and bins are renumbered when it exceeds that.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.prove.generator.layout import At, Thick
 from xb_muscle_ros.prove.generator.pieces import (
@@ -24,8 +23,7 @@ from xb_muscle_ros.prove.generator.pieces import (
     thick,
     thin,
 )
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # The loop knows constants of a module, but not the members of an enumeration.
 _F, _W, _K11, _K12, _K21, _K22 = (int(i) for i in (At.F, At.W, At.K11, At.K12, At.K21, At.K22))

@@ -35,8 +35,6 @@ class Part(NamedTuple):
     Attributes:
         kind: ``null``: ordinary artefacts only; ``artefact``: artefacts beyond them; ``composite``: mechanisms;
             ``outside``: an effect that has no name, perhaps beside a mechanism.
-        share: of all cases.
-        mechanisms, artefacts: how many.
     """
 
     kind: str
@@ -55,7 +53,7 @@ _SIZES = ((0.003, 0.01, 0.15), (0.01, 0.04, 0.75), (0.04, 0.05, 0.10))
 # How many trials, and how often.
 _TRIALS = ((7, 7, 0.3), (8, 12, 0.55), (13, 20, 0.1), (21, 30, 0.05))
 # A refit takes the place of the others: nobody could find them.
-_MEANT = tuple(name.value for name in MECHANISMS if name not in (Name.TEMPERATURE, Name.PHOSPHATE))
+_MEANT = tuple(name for name in MECHANISMS if name not in (Name.TEMPERATURE, Name.PHOSPHATE))
 
 
 class Spec(NamedTuple):
@@ -67,7 +65,6 @@ class Spec(NamedTuple):
         sizes: of a single, the RMS that all leave after a refit; of a composite, the unique contribution of each, F0.
         model: that the tool is given.
         artefacts: of the measurement, of different families.
-        trials: of the study.
     """
 
     kind: str
@@ -88,9 +85,9 @@ def singles(cases: int, seed: int) -> list[Spec]:
     random = np.random.default_rng([seed, 0])
     counts = dict(zip(SHARES, _counts(list(SHARES.values()), cases), strict=True))
     made = [Spec(NULL, (), (), drawn_model(random, tuple(MODEL_SHARES))) for _ in range(counts[NULL])]
-    for name in _turns(random, [name.value for name in MEASUREMENT], counts[ARTEFACT]):
+    for name in _turns(random, list(MEASUREMENT), counts[ARTEFACT]):
         made.append(Spec(ARTEFACT, (), (), drawn_model(random, tuple(MODEL_SHARES)), (name,)))
-    for kind, labels in ((SINGLE, [name.value for name in MECHANISMS]), (OUTSIDE_KIND, list(OUTSIDE))):
+    for kind, labels in ((SINGLE, list(MECHANISMS)), (OUTSIDE_KIND, list(OUTSIDE))):
         for label, size in _sized(random, labels, counts[kind]):
             made.append(Spec(kind, (label,), (size,), drawn_model(random, EFFECTS[label].models)))
     made += [_pair(random, size) for size in _turns(random, SIZES, counts[PAIR])]
@@ -101,7 +98,7 @@ def spikes(cases: int, seed: int, model: str) -> list[Spec]:
     """Cases for recordings of one fibre: one in five as recorded, else a mechanism that the model can have."""
     random = np.random.default_rng([seed, 0])
     bare = round(0.2 * cases)
-    possible = [name.value for name in MECHANISMS if model in EFFECTS[name.value].models]
+    possible = [name for name in MECHANISMS if model in EFFECTS[name].models]
     if not possible:
         raise UserError(f"model {model} can have no effect of the generator; allowed are {', '.join(MODEL_SHARES)}")
     made = [Spec(NULL, (), (), model) for _ in range(bare)]
@@ -188,7 +185,7 @@ def _least_used(
 
 
 def _families(labels: Iterable[str]) -> set[str]:
-    return {FAMILY[Name(label)] for label in labels if label not in OUTSIDE}
+    return {FAMILY[label] for label in labels if label not in OUTSIDE}
 
 
 def _models_of(labels: Iterable[str]) -> tuple[str, ...]:

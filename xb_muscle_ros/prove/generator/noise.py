@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import lfilter
 
 from xb_muscle_ros.prove.generator.world import SAMPLE_S
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 
 def noise(random: np.random.Generator, n: int, share: float) -> tuple[Array, float]:
     """Slow noise, with hum where force is high.
 
     Args:
-        random: decides.
         n: number of samples, 1 ms apart.
         share: isometric force relative to that at pCa 4.5.
 

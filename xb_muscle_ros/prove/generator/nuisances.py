@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.diagnose.names import Name
 from xb_muscle_ros.prove.generator.artefacts import PRIORS
@@ -13,8 +12,7 @@ from xb_muscle_ros.prove.generator.refit import Refit, Refitted
 from xb_muscle_ros.prove.generator.study import Planned
 from xb_muscle_ros.prove.generator.truth import Truth, study_forces
 from xb_muscle_ros.prove.generator.world import SAMPLE_S, World
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 _SHIFT, _GAIN = 0.01, 0.01
 # Ten independent observations of 0.3 % F0 a trial.
@@ -51,7 +49,6 @@ def artefact_columns(
 
     Args:
         forces: of every trial, F0, where pCa is so much higher and length changes are so much larger.
-        study: planned trials.
         plain: forces without artefacts.
         sizes: SD by name of the artefact: pCa of each solution, length gain, run-down, delay, offset and drift of each
             trial. Those that are not named are left out.
@@ -61,23 +58,23 @@ def artefact_columns(
         return np.concatenate([np.zeros(f.size) if p is None else p for p, f in zip(parts, plain, strict=True)])
 
     columns = []
-    if (sd := sizes.get(Name.PCA_SHIFT.value)) is not None:
+    if (sd := sizes.get(Name.PCA_SHIFT)) is not None:
         by_shift = [(a - b) * sd / _SHIFT for a, b in zip(forces(_SHIFT, 0.0), plain, strict=True)]
         for pca in sorted({trial.pca for trial in study}):
             columns.append(
                 of_trials([part if trial.pca == pca else None for part, trial in zip(by_shift, study, strict=True)])
             )
-    if (sd := sizes.get(Name.LENGTH_GAIN.value)) is not None:
+    if (sd := sizes.get(Name.LENGTH_GAIN)) is not None:
         columns.append(of_trials([(a - b) * sd / _GAIN for a, b in zip(forces(0.0, _GAIN), plain, strict=True)]))
-    if (sd := sizes.get(Name.RUN_DOWN.value)) is not None:
+    if (sd := sizes.get(Name.RUN_DOWN)) is not None:
         columns.append(of_trials([-i * sd * force for i, force in enumerate(plain)]))
-    if (sd := sizes.get(Name.TIME_SHIFT.value)) is not None:
+    if (sd := sizes.get(Name.TIME_SHIFT)) is not None:
         columns.append(of_trials([-sd * np.gradient(force, SAMPLE_S) for force in plain]))
     for i, force in enumerate(plain):
         for name, shape in (
             (Name.FORCE_OFFSET, np.ones(force.size)),
             (Name.FORCE_DRIFT, np.arange(force.size) * SAMPLE_S),
         ):
-            if (sd := sizes.get(name.value)) is not None:
+            if (sd := sizes.get(name)) is not None:
                 columns.append(of_trials([sd * shape if j == i else None for j in range(len(plain))]))
     return columns

@@ -10,11 +10,10 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.prove.generator.layout import At, Series, Thick, Thin
+from xb_muscle_ros.trials.trial import Array
 
-Array = npt.NDArray[np.float64]
 F = TypeVar("F", bound=Callable[..., Any])
 
 # The loop knows constants of a module, but not the members of an enumeration.

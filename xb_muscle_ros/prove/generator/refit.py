@@ -6,12 +6,10 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.prove.generator.truth import Truth, study_forces
 from xb_muscle_ros.prove.generator.world import Mesh, Stimulus, World
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 _FITTED = ("f", "k11", "k21", "k22", "kon", "koop", "JF", "kappa", "n", "kse", "kse0")
 _STEP = 0.02
@@ -32,7 +30,6 @@ class Refitted(NamedTuple):
     Attributes:
         rms: of the residual over all samples, F0.
         residual: data minus base, F0, by trial.
-        values: of the fitted constants.
         at: where these lie: changes of their logarithms, and of the parallel spring.
     """
 
@@ -53,13 +50,11 @@ class Refit:
     def __init__(
         self, base: World, study: Sequence[Stimulus], dress: Callable[[World], Truth] = Truth, mesh: Mesh = _COARSE
     ) -> None:
-        """Take the Jacobian.
+        """Take the Jacobian at the true constants of the plain world that the tool is given.
 
         Args:
-            base: the plain world that the tool is given, with the true constants.
             study: stated calcium and recorded length of every trial.
-            dress: what is fitted besides the plain world's constants: effects that the model has as well.
-            mesh: resolution.
+            dress: puts on it the effects that the model has as well.
         """
         self._base, self._study, self._dress, self._mesh = base, list(study), dress, mesh
         self.names = tuple(name for name in _FITTED if name in base.values)

@@ -6,10 +6,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Ten independent observations of 0.3 % F0 a trial, against priors of SD 1 on every coordinate.
 WORTH, WORTH_SD = 10.0, 0.003
@@ -46,7 +45,6 @@ class Rest:
 
         Args:
             columns: shape (samples of all trials, coordinates), F0.
-            trials: how many there are.
         """
         self._columns = columns
         self._weight = np.sqrt(WORTH * trials / self._columns.shape[0]) / WORTH_SD

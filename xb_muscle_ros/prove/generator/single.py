@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.prove.generator.artefacts import Artefacts, draw_artefact
 from xb_muscle_ros.prove.generator.case import (
     Case,
     Concealed,
     Drawn,
-    drawn,
     drawn_until,
     forces_of,
     noises,
@@ -29,8 +27,7 @@ from xb_muscle_ros.prove.generator.nuisances import residual_beside_nuisances
 from xb_muscle_ros.prove.generator.refit import Refit, Refitted
 from xb_muscle_ros.prove.generator.study import Planned
 from xb_muscle_ros.prove.generator.world import World
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 _ROUNDS = 7
 # Sizes within this of what was asked for are as asked for.
@@ -74,13 +71,11 @@ def facts(
 
 def make_single(spec: Spec, seed: int, number: int) -> Single:
     """See `case.drawn_until`."""
-    return drawn_until(lambda random, _: _attempt(spec, random), spec, seed, number)
+    return drawn_until(lambda found, random, _: _attempt(spec, found, random), spec, seed, number)
 
 
-def _attempt(spec: Spec, random: np.random.Generator) -> Single | None:
-    found = drawn(spec, random)
-    if found is None:
-        return None
+def _attempt(spec: Spec, found: Drawn, random: np.random.Generator) -> Single | None:
+    """A case of one draw; None where it is not usable."""
     base, concealed = found.base, found.concealed
     # Levels of calcium are chosen by what the fibre does, which its effects change; so perhaps twice.
     for _ in range(2):
@@ -91,25 +86,19 @@ def _attempt(spec: Spec, random: np.random.Generator) -> Single | None:
         artefacts = draw_artefact(spec.artefacts[0], random, study) if spec.artefacts else Artefacts()
         concealed, forces, refitted = conceal(spec, concealed, base, study, artefacts, refit)
         if usable(study, forces):
-            return _finished(spec, random, found, study, concealed, artefacts, forces, refit, refitted)
+            break
         if not concealed:
             return None
-    return None
-
-
-def _finished(
-    spec: Spec, random: np.random.Generator, found: Drawn, study: list[Planned], concealed: list[Concealed],
-    artefacts: Artefacts, forces: list[Array], refit: Refit, refitted: Refitted,
-) -> Single:  # fmt: skip
-    """The case, with noise."""
+    else:
+        return None
     noise = noises(random, forces)
     return Single(
-        spec, found.fibre, found.nominal, dict(found.base.values), study, concealed, artefacts,
+        spec, found.fibre, found.nominal, dict(base.values), study, concealed, artefacts,
         recorded=[force + added for force, (added, _) in zip(forces, noise, strict=True)],
         noise_sd=[sd for _, sd in noise],
         before=rms([np.concatenate(forces) - np.concatenate(refit.plain())]),
         refitted=refitted,
-        beside_nuisances=residual_beside_nuisances(found.base, study, refit, refitted),
+        beside_nuisances=residual_beside_nuisances(base, study, refit, refitted),
     )  # fmt: skip
 
 

@@ -6,12 +6,10 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.prove.generator.world import SAMPLE_S, Stimulus
-from xb_muscle_ros.trials.trial import Phase
+from xb_muscle_ros.trials.trial import Array, Phase
 
-Array = npt.NDArray[np.float64]
 Piece = tuple[str, float, float]
 """Name of a phase, duration (s), change of length (L0)."""
 
@@ -50,7 +48,6 @@ def plan(
     """Trials: relaxed, fully active and at three or more levels between; stretches, ramps and a release.
 
     Args:
-        random: decides.
         force_of: isometric force at a pCa, F0.
         gentle: slower and smaller, for a fibre without series spring.
         trials: how many, at least `TRIALS`; the more there are, the more levels of calcium.
@@ -63,7 +60,7 @@ def plan(
     between = [float(p) for p in grid if 0.15 * full <= force_of(float(p)) <= 0.85 * full]
     if len(between) < 3:
         return None
-    chosen = _spread_over(random, between, _levels(trials))
+    chosen = _spread_over(random, between, 3 + sum(trials >= more for more in _MORE_LEVELS))
     levels = [9.0, 4.5, *chosen]
     again = [*chosen, 4.5] if trials < _RELAXED_AGAIN else [*chosen, 4.5, 9.0]
     while len(levels) < trials:
@@ -76,11 +73,6 @@ def plan(
     first = [str(kind) for kind in random.choice(["paper", "slow", "fast"], 2)]
     planned = [_trial(random, kind, pca, gentle) for kind, pca in zip([*first, *kinds], levels, strict=False)]
     return [planned[i] for i in random.permutation(trials)]
-
-
-def _levels(trials: int) -> int:
-    """How many levels of calcium between rest and full activation a study of so many trials has."""
-    return 3 + sum(trials >= more for more in _MORE_LEVELS)
 
 
 def _spread_over(random: np.random.Generator, between: Sequence[float], count: int) -> list[float]:

@@ -6,12 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.prove.generator.layout import At
 from xb_muscle_ros.prove.generator.world import Acting, Answer, AtRest, Mesh, Stimulus, World, simulate
+from xb_muscle_ros.trials.trial import Array
 
-Array = npt.NDArray[np.float64]
 Act = Callable[[Sequence[Stimulus], int], Acting]
 Add = Callable[[Stimulus, Answer], Array]
 

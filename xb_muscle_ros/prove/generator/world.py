@@ -7,13 +7,11 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.prove.generator import kernel
 from xb_muscle_ros.prove.generator.layout import At, Series, Thick, Thin
 from xb_muscle_ros.prove.generator.pieces import series_length
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 FORCE_SCALE = 2.0
 """F0 per cross-bridge force."""
@@ -162,7 +160,6 @@ def simulate(
     """A trial, from isometric steady state.
 
     Args:
-        world: the fibre.
         stimulus: length linear between samples 1 ms apart.
         acting: see there; None for a fibre without such effects.
         mesh: resolution; None for the usual one.

@@ -14,9 +14,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.scores.noise.members import SILENCE, OrnsteinUhlenbeck
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0, MEMBERS, Source, TrialNoise
-from xb_muscle_ros.trials.trial import Trial
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array, Trial
 
 LEAST_DIFFERENCES = 10
 """Samples of force that a trial needs."""

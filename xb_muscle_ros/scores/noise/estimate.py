@@ -9,26 +9,19 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.scores.noise.members import SILENCE, Regression
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0, Source, TrialNoise
 from xb_muscle_ros.scores.noise.posterior import most_probable, possible, prior_mean, share_of_others
 from xb_muscle_ros.scores.noise.regressions import ORDER, Part, Regressions, correlation, regressions, squares
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Sampling steps within this factor of each other have noise of one autocorrelation.
 _SAME_STEP = 1.2
 
 
 def by_regressions(parts: Mapping[str, Sequence[Part]], source: Source) -> dict[str, TrialNoise]:
-    """Noise of trials.
-
-    Args:
-        parts: of each, at least one.
-        source: what they are.
-    """
+    """Noise of trials, each of at least one part."""
     sounding = [p for own in parts.values() for p in own if not p.silent]
     if not sounding:
         return {name: _of_trial(name, parts, np.zeros(ORDER), source) for name in parts}

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.signal import lfilter, lfiltic
 
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Samples until drawn noise forgets how it began.
 _BURN_IN = 400
@@ -37,8 +35,7 @@ class Regression(NamedTuple):
             (factor.size, time_s.size + _BURN_IN)
         )
         # Along the last axis, where samples lie side by side: three times as fast.
-        out: Array = lfilter([1.0], np.concatenate([[1.0], -self.weights]), white, axis=-1)[:, _BURN_IN:]
-        return out
+        return lfilter([1.0], np.concatenate([[1.0], -self.weights]), white, axis=-1)[:, _BURN_IN:]
 
     def variance_of_mean(self, time_s: Array) -> float:
         """See `model.Member`."""
@@ -59,8 +56,7 @@ class Regression(NamedTuple):
         """See `model.Member`."""
         lags = lags_s / step_s
         gamma = self.autocovariance(int(np.ceil(lags[-1] - 1e-6)) + 1)
-        out: Array = np.interp(lags, np.arange(gamma.size), gamma)
-        return out
+        return np.interp(lags, np.arange(gamma.size), gamma)
 
     def times(self, factor: float) -> Regression:
         """See `model.Member`."""

@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Models of a trial's noise from which draws come.
 MEMBERS = 24
@@ -42,7 +41,6 @@ class Member(Protocol):
         Args:
             time_s: shape (n,), s.
             factor: how many times larger, shape (draws,).
-            random: where it comes from.
         """
 
     def variance_of_mean(self, time_s: Array) -> float:
@@ -65,8 +63,6 @@ class TrialNoise:
     """Noise of one trial.
 
     Attributes:
-        trial: name.
-        source: from what it was taken.
         samples: of force that told of it.
         sd_f0: standard deviation, F0.
         freedom: degrees of freedom with which the size is known, given the autocorrelation.
@@ -90,8 +86,6 @@ class TrialNoise:
         Args:
             time_s: shape (n,), s.
             picked: which member, shape (draws,), each with a size that is drawn; None for the likeliest.
-            draws: how many.
-            random: where it comes from.
         """
         out = np.empty((draws, time_s.size))
         which = np.full(draws, -1) if picked is None else picked % len(self.members)
@@ -128,8 +122,6 @@ class NoiseModel:
 
         Args:
             times_s: of the samples of each trial, s.
-            draws: how many.
-            random: where it comes from.
             uncertain: draw size and autocorrelation as well, from what is not known of them.
 
         Returns:

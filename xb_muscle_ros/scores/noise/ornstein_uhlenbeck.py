@@ -10,14 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.scores.noise.members import SILENCE, OrnsteinUhlenbeck
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0, Source, TrialNoise
 from xb_muscle_ros.scores.noise.posterior import share_of_others, spread_over
 from xb_muscle_ros.scores.noise.regressions import restricted
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Noise of real force at 1 kHz (rat soleus fibre 18Dec2017a, lag-1 correlation 0.95) decays within 20 ms; 50 times
 # longer or shorter is nothing special. Where steps are much shorter, a thousandth of white noise shows.
@@ -40,7 +38,6 @@ class Whitened:
     """Samples and regressors, whitened for noise of variance 1 at every point of a grid.
 
     Attributes:
-        samples: how many.
         products: of whitened columns with each other, the samples' first, shape (points, 1 + columns, 1 + columns).
         log: log-determinant of the noise's covariance, shape (points,).
     """
@@ -83,7 +80,6 @@ class Part:
 
     Attributes:
         silent: whether there is nothing left beside the drift.
-        samples: how many.
         freedom: samples less what the drift takes.
         squares: sum of squares of whitened force beside whitened drift, F0², shape (points,).
         log: log-determinants, shape (points,).
@@ -104,17 +100,8 @@ class Part:
         self.log = whitened.log + of_drift
 
 
-def by_ornstein_uhlenbeck(parts: Mapping[str, Sequence[Part]], source: Source) -> dict[str, TrialNoise]:
-    """Noise of trials.
-
-    Args:
-        parts: of each, at least one.
-        source: what they are.
-    """
-    return {name: _of_trial(name, parts, source) for name in parts}
-
-
-def _of_trial(name: str, parts: Mapping[str, Sequence[Part]], source: Source) -> TrialNoise:
+def of_trial(name: str, parts: Mapping[str, Sequence[Part]], source: Source) -> TrialNoise:
+    """Noise of one of the trials whose parts are given, at least one of each."""
     own = [p for p in parts[name] if not p.silent]
     samples, freedom = (int(sum(p.samples for p in parts[name])), sum(p.freedom for p in own or parts[name]))
     if not own:

@@ -13,13 +13,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.scores.noise.windows import LEAST, MOST, same_calcium
 from xb_muscle_ros.trials.corners import SMALLEST_RAMP, SMALLEST_STRAIN
-from xb_muscle_ros.trials.trial import Phase, Trial
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array, Phase, Trial
 
 # Share of a phase's samples that is left out at either end: corners are rounded, and what is fastest comes first.
 _ENDS = 0.1
@@ -48,12 +45,7 @@ class Piece(NamedTuple):
     drift: Array
 
 
-def evenly_sampled(trial: Trial) -> bool:
-    """Whether a trial's force has samples a step apart, jitter and gaps aside."""
-    return steps_evenly(trial.force_time_s)
-
-
-def steps_evenly(time_s: Array) -> bool:
+def evenly_sampled(time_s: Array) -> bool:
     """Whether samples are a step apart, jitter and gaps aside."""
     steps = np.diff(time_s)
     if not steps.size:

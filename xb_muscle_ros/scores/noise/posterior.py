@@ -9,8 +9,7 @@ import numpy.typing as npt
 
 from xb_muscle_ros.scores.noise.model import MEMBERS
 from xb_muscle_ros.scores.noise.regressions import ORDER, Part, regressions, squares
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # Partial correlations as inverse hyperbolic tangents: how far they go (0.995), and what to expect of force recordings
 # (rat soleus fibre 18Dec2017a at 1 kHz has lag-1 correlations of 0.91 to 0.98, and hum: noise that decays within 18 ms,
@@ -68,8 +67,7 @@ def possible(parts: Sequence[Part], shares: Sequence[float], z: Array, own: int)
     log = -_costs(parts, shares, np.clip(tried, -_REACH, _REACH)) + 0.5 * np.sum(normal**2, axis=1) / _WIDER**2
     weights = np.where(np.all(np.abs(tried) <= _REACH, axis=1), np.exp(log - log.max()), 0.0)
     found = regressions(np.clip(tried, -_REACH, _REACH))
-    possible: Array = tried[spread_over(np.sum(squares(parts[:own], found)[0], axis=1) * found.sizes[:, 0], weights)]
-    return possible
+    return tried[spread_over(np.sum(squares(parts[:own], found)[0], axis=1) * found.sizes[:, 0], weights)]
 
 
 def spread_over(sizes: Array, weights: Array) -> npt.NDArray[np.intp]:

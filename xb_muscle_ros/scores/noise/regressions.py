@@ -10,11 +10,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.scores.noise.model import LEAST_SD_F0
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 ORDER = 6
 
@@ -25,7 +23,6 @@ class Part:
     Attributes:
         step_s: between samples, s.
         silent: whether there is nothing left beside the drift.
-        samples: how many.
         freedom: samples less what the drift takes.
         empty: ones on the diagonal for columns of drift that there are not, shape (width, width).
         begin: first samples of force and drift, shape (1 + width, order).

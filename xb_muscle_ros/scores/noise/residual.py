@@ -14,12 +14,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.scores.noise.members import recursion
 from xb_muscle_ros.scores.noise.ornstein_uhlenbeck import SHARES, TAUS_S, Whitened, log_prior
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array
 
 # No recording is better known, nor is a model, F0: a third of the least noise of a measured fibre. It keeps intervals
 # from being absurdly narrow where trials are simulated ones without noise.
@@ -57,14 +55,12 @@ class ResidualNoise(NamedTuple):
     @property
     def variance_f0(self) -> Array:
         """Of each trial, F0², shape (trials,)."""
-        out: Array = self.variances_f0 @ self.probability
-        return out
+        return self.variances_f0 @ self.probability
 
     def covariance_of_sums(self, trial: int, weights: Array) -> Array:
         """Covariance of weighted sums over a trial's samples of its noise, shape (sums, sums).
 
         Args:
-            trial: its place.
             weights: shape (samples, sums).
         """
         plain = weights.T @ weights

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtri
 
 from xb_muscle_ros.errors import UserError
@@ -19,9 +18,7 @@ from xb_muscle_ros.scores.noise.pieces import Piece, evenly_sampled, smooth_piec
 from xb_muscle_ros.scores.noise.regressions import Part
 from xb_muscle_ros.scores.noise.windows import LEAST, Window, isometric_window
 from xb_muscle_ros.scores.steady import steady_part
-from xb_muscle_ros.trials.trial import Trial
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array, Trial
 
 # Windows with fewer samples together tell less than smooth pieces do.
 ENOUGH = 60
@@ -53,7 +50,7 @@ def noise_of(trials: Sequence[Trial]) -> NoiseModel:
     for trial in trials:
         if not np.all(np.isfinite(trial.force_n)):
             raise UserError(f"trial {trial.facts.trial}: force is not finite; leave the trial out")
-    even = {t.facts.trial: evenly_sampled(t) for t in trials}
+    even = {t.facts.trial: evenly_sampled(t.force_time_s) for t in trials}
     known = by_windows([isometric_window(t) for t in trials if even[t.facts.trial]])
     enough = sum(noise.samples for noise in known.values()) >= ENOUGH
     by_pieces = [t for t in trials if not (enough and even[t.facts.trial])]
@@ -113,7 +110,6 @@ def by_curves(pieces: Mapping[str, Sequence[Piece]], even: Mapping[str, bool]) -
     Autoregressions where samples come evenly and fast enough for hum to be seen, else an Ornstein-Uhlenbeck process.
 
     Args:
-        pieces: of each trial.
         even: whether its force is sampled evenly.
     """
     fast = {
@@ -124,7 +120,7 @@ def by_curves(pieces: Mapping[str, Sequence[Piece]], even: Mapping[str, bool]) -
     width = max((p.drift.shape[1] for n in fast for p in pieces[n]), default=0)
     parts = {n: [Part(_step_s(p.time_s), p.force_f0, p.drift, width) for p in pieces[n]] for n in pieces if n in fast}
     timed = {n: [ou.Part(*p) for p in of] for n, of in pieces.items() if of and n not in fast}
-    return by_regressions(parts, Source.CURVE) | ou.by_ornstein_uhlenbeck(timed, Source.CURVE)
+    return by_regressions(parts, Source.CURVE) | {n: ou.of_trial(n, timed, Source.CURVE) for n in timed}
 
 
 def _step_s(time_s: Array) -> float:

@@ -7,12 +7,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.scores.steady import steady_part
-from xb_muscle_ros.trials.trial import Trial
-
-Array = npt.NDArray[np.float64]
+from xb_muscle_ros.trials.trial import Array, Trial
 
 # A window has at least this many samples; more than the most tell no more about noise, only about slow force.
 LEAST, MOST = 20, 1000
@@ -24,7 +21,6 @@ class Window(NamedTuple):
     """Force while the muscle only holds.
 
     Attributes:
-        trial: name.
         step_s: between samples, s.
         force_f0: shape (n,), evenly sampled, F0; empty where the trial has no such time.
     """

@@ -42,7 +42,6 @@ class Signal:
         """Make sure that the signal's numbers, converted, are within limits.
 
         Args:
-            where: the trial, for messages.
             values: shape (n,).
             limits: least and most.
             shown: how a message shows a value: a format with its unit.
@@ -112,7 +111,6 @@ class Draft:
     """A trial in the making.
 
     Attributes:
-        recording, mapping: what it is made of.
         notes: what was done to the data, in words, for the trial's ``source``.
         warnings: what is unusual, one line each.
     """

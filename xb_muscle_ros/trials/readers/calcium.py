@@ -21,6 +21,7 @@ CALCIUM_RANGE_UM = (0.0, 1e5)
 PCA_RANGE = (1.0, 12.0)
 # pCa is noted to a tenth.
 SAME_PCA = 0.05
+PCA_COLUMN = re.compile(r"p[ _-]?ca([^a-z0-9]|$)", re.IGNORECASE)
 
 
 class Calcium(NamedTuple):
@@ -67,7 +68,7 @@ def _by_column(draft: Draft, signal: Signal, clock: Clock) -> Calcium:
         pca = float(signal.values[0]) if is_pca else float(6.0 - np.log10(calcium_um[0]))
     time_s = times_of(signal, clock, draft)
     warn_of_calcium(draft, calcium_um)
-    if not is_pca and re.match(r"p[ _-]?ca([^a-z0-9]|$)", column.name, re.IGNORECASE):
+    if not is_pca and PCA_COLUMN.match(column.name):
         draft.warn(f"{signal.name} is read in {column.unit_name} but called pCa; is pCa its unit?")
     count = int(np.count_nonzero(changes)) - 1
     if count:

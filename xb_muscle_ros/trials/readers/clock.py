@@ -54,7 +54,6 @@ def check_gaps(draft: Draft, signal: Signal, time_s: Array) -> None:
 
     Args:
         draft: its mapping tells the largest step allowed; what that allows is no gap.
-        signal: whose times they are.
         time_s: increasing times, s.
 
     Raises:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.assembly import trial_of
 from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal, begin_of
+from xb_muscle_ros.trials.readers.calcium import PCA_COLUMN, SAME_PCA
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled
 from xb_muscle_ros.trials.readers.table import Table, looks_like_text, number, read_table
 from xb_muscle_ros.trials.trial import Trial
@@ -24,9 +25,6 @@ TRIAL_COLUMN = "trial"
 # Time that starts anew comes back to its first value within so many steps, and goes on for so many samples.
 _SAME_START_STEPS = 2.0
 _LEAST_SAMPLES = 10
-# pCa is noted to a tenth.
-_SAME_PCA = 0.05
-_PCA_COLUMN = re.compile(r"p[ _-]?ca([^a-z0-9]|$)", re.IGNORECASE)
 _PCA_IN_NAME = re.compile(r"p[ _-]?ca[ _=:-]*(\d+(?:[.,]\d+)?)", re.IGNORECASE)
 
 
@@ -131,16 +129,16 @@ def check_pca(table: Table, mapping: ImportMapping, part: Part, pca: float | Non
     force = "" if mapping.force is None else mapping.force.name
     others = []
     for name in table.header:
-        if _PCA_COLUMN.match(name):
+        if PCA_COLUMN.match(name):
             _check_column(table, name, part, pca)
         found = _PCA_IN_NAME.search(name)
         if found is None:
             continue
         stated = float(found.group(1).replace(",", "."))
         stated = stated / 10.0 if stated > 12.0 else stated  # 61 is 6.1
-        if abs(stated - pca) > _SAME_PCA and name == force:
+        if abs(stated - pca) > SAME_PCA and name == force:
             yield f"{table.path}: the force column is '{name}', but pCa is given as {pca:g}; check both"
-        elif abs(stated - pca) > _SAME_PCA:
+        elif abs(stated - pca) > SAME_PCA:
             others.append(f"'{name}'")
     if others:
         yield (
@@ -155,7 +153,7 @@ def _check_column(table: Table, name: str, part: Part, pca: float) -> None:
     with np.errstate(invalid="ignore"):
         if not np.all((values >= 1.0) & (values <= 12.0)):
             return  # no pCa
-    other = np.flatnonzero(np.abs(values - pca) > _SAME_PCA)
+    other = np.flatnonzero(np.abs(values - pca) > SAME_PCA)
     if other.size:
         row = int(part.rows[other[0]])
         raise UserError(

@@ -14,6 +14,8 @@ from xb_muscle_ros.trials.readers.units import Quantity, Unit, finite
 
 # What a length may be the length of, the first by default.
 LENGTHS_OF = ("fibre", "half_sarcomere", "sarcomere")
+# A reference length that is no number: the length before the first stretch.
+FIRST_ISOMETRIC = "first_isometric"
 FACTS = ("pca", "amplitude_l0", "recovery_s")
 # Endings of files that tell a format and are no part of a name.
 ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc", ".mat", ".slc", ".mcap", ".db3")

@@ -39,9 +39,7 @@ def read_force(
     """Make force of the force column.
 
     Args:
-        draft: recording and mapping.
         time_s: the force's own times, s.
-        phases: of the trial.
         pca: None where calcium changes.
         scaling: scale to the isometric trial; None where the mapping has fractions.
 

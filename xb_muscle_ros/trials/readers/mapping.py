@@ -14,7 +14,6 @@ import yaml
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.columns import (
-    BAG,
     FILE,
     SIGNALS,
     optional_column,
@@ -23,14 +22,11 @@ from xb_muscle_ros.trials.readers.columns import (
     read_stimulation,
     trial_column,
 )
-from xb_muscle_ros.trials.readers.description import FACTS, LENGTHS_OF, ImportMapping
+from xb_muscle_ros.trials.readers.description import FACTS, FIRST_ISOMETRIC, LENGTHS_OF, ImportMapping
 from xb_muscle_ros.trials.readers.table import DECIMALS
 from xb_muscle_ros.trials.readers.tree import Keys, check_keys
 from xb_muscle_ros.trials.readers.units import finite
 
-__all__ = ["BAG", "FILE", "FIRST_ISOMETRIC", "ImportMapping", "build_mapping", "load_mapping"]
-
-FIRST_ISOMETRIC = "first_isometric"
 _NAMES = ("fibre", "trial", "data_set", "source")
 _PARTS = ("columns", "reference_length", "f0", "activation", "phases", "file_name", "isometric_scaling")
 # Beyond these it is no muscle's F0, or its unit is wrong: a myofibril to the largest muscles, weak to strong.
@@ -59,7 +55,6 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
 
     Args:
         tree: as a mapping file has it, without ``per_file`` and ``format``.
-        where: the mapping file, for messages.
         kind: `FILE` where signals are columns or channels, `BAG` where they are topics.
 
     Raises:

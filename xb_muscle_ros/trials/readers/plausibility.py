@@ -67,8 +67,6 @@ def warn_of_spikes(draft: Draft, signal: Signal, values: Array, limit: float, un
     """Warn where single samples leave both of their neighbours, to the same side, by more than a limit.
 
     Args:
-        draft: the trial.
-        signal: whose values they are.
         values: shape (n,), relative to L0 or F0.
         limit: what no single sample departs by, in the same unit.
         unit: its name.

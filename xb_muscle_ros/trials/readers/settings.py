@@ -57,9 +57,7 @@ class ImportSettings:
 
         Args:
             tree: of the mapping file; empty where there is none.
-            where: the mapping file or the command line, for messages.
             file_format: name of a reader; None for what the mapping says, or else each file looks like.
-            isometric_scaling: see `assembly.trial_of`.
             overrides: goes before the mapping file, for every file.
 
         Raises:
@@ -152,9 +150,6 @@ def isometric_f0(
     """F0 of the preparation whose files a folder holds, and its origin in words; None where no file tells it.
 
     Args:
-        folder: of the preparation.
-        suffix: ending of its files.
-        reader: reads them.
         mapping: of them; its F0 is not used.
         pca: of the trial looked for. Where several have it, the largest force counts: a fibre runs down.
     """

@@ -44,7 +44,6 @@ class SlcHeader:
     """What stands above the data.
 
     Attributes:
-        path: the file.
         info: what the experimenter noted (pCa, species, temperature, ...), by name.
         values: everything else, by the name before the colon.
         recorded: day and time, as in the file.

@@ -73,7 +73,6 @@ class Table:
     """A table as text: ``header`` names the columns, ``rows`` pairs line numbers (from 1) with cells.
 
     Attributes:
-        path: the file.
         header: names of the columns, none twice.
         rows: line number and cells of each row.
         decimal: `POINT` or `COMMA`.
@@ -145,7 +144,6 @@ def read_table(path: Path, decimal: str | None = None) -> Table:
     """Read delimited text: comma, semicolon or tab, told by the header line; lines that begin with # are comments.
 
     Args:
-        path: the file.
         decimal: `POINT` or `COMMA`; None for what the cells show.
 
     Raises:

@@ -24,7 +24,6 @@ class Keys:
 
         Args:
             tree: what stands below the key.
-            where, path: see above.
             known: keys that are allowed; None for any.
 
         Raises:

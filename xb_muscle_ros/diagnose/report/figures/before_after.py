@@ -10,7 +10,6 @@ import numpy as np
 from xb_muscle_ros.diagnose.report.figures.common import (
     DOTS,
     WIDTH_MM,
-    Array,
     Figure,
     by_activation,
     finite,
@@ -30,6 +29,7 @@ from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
 from xb_muscle_ros.diagnose.words import joined
 from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure
+from xb_muscle_ros.trials.trial import Array
 
 _TRIALS, _ROWS = 3, 24
 _TOP_MM, _ROW_MM, _SCATTER_MM = 68.0, 4.3, 70.0

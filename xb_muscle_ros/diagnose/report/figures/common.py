@@ -9,33 +9,41 @@ import re
 import textwrap
 import warnings
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from xb_muscle_ros.diagnose.component import Kind
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
 from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND
+from xb_muscle_ros.trials.trial import Array
 
-Array = npt.NDArray[np.float64]
 Key = tuple[str, str]
 """Fibre and trial."""
 
 WIDTH_MM = 178.0
 """Between the margins of an A4 page."""
-DASHED: Any = (0, (4, 1.6))
-BASE_LINE: dict[str, Any] = {"color": SECOND, "linestyle": DASHED, "linewidth": 1.0, "label": "base model"}
-ANSWER_LINE: dict[str, Any] = {"color": MODEL, "linewidth": 1.0, "label": "answer"}
-DATA_LINE: dict[str, Any] = {"color": DATA, "linewidth": 1.8, "label": "measured", "solid_capstyle": "round"}
-BASE_DOT: dict[str, Any] = {
-    "marker": "o", "markerfacecolor": "white", "markeredgecolor": SECOND, "linestyle": "none", "label": "base model",
-}  # fmt: skip
-ANSWER_DOT: dict[str, Any] = {"marker": "o", "color": MODEL, "linestyle": "none", "label": "answer"}
+# Base and answer, as lines and as dots.
+LINES: tuple[dict[str, Any], ...] = (
+    {"color": SECOND, "linestyle": (0, (4, 1.6)), "linewidth": 1.0, "label": "base model"},
+    {"color": MODEL, "linewidth": 1.0, "label": "answer"},
+)
+DOTS: tuple[dict[str, Any], ...] = (
+    {"marker": "o", "markerfacecolor": "white", "markeredgecolor": SECOND, "linestyle": "none", "label": "base model"},
+    {"marker": "o", "color": MODEL, "linestyle": "none", "label": "answer"},
+)
+_DATA_LINE: dict[str, Any] = {"color": DATA, "linewidth": 1.8, "label": "measured", "solid_capstyle": "round"}
+KIND_LOOKS: Mapping[Kind, dict[str, Any]] = MappingProxyType(
+    {
+        Kind.MECHANISM: {"facecolor": MODEL, "edgecolor": MODEL},
+        Kind.ARTEFACT: {"facecolor": "white", "edgecolor": SECOND, "hatch": "/////"},
+    }
+)
+"""Areas of mechanisms and of artefacts, which are hatched."""
 _BINS = 450
-LINES: tuple[dict[str, Any], ...] = (BASE_LINE, ANSWER_LINE)
-DOTS: tuple[dict[str, Any], ...] = (BASE_DOT, ANSWER_DOT)
 _NAME = 26
 _CLIP = re.compile(r"\bp[0-9a-f]{10}\b")
 
@@ -129,7 +137,7 @@ def thinned(time: Array, values: Array) -> tuple[Array, Array]:
 
 def plot_force(axis: Any, t: TrialTraces, models: Iterable[Array]) -> list[Any]:
     """Measured force and what base and, if given, answer make of it, F0; handles for a legend."""
-    handles = axis.plot(*thinned(t.time_s, t.measured_f0), **DATA_LINE)
+    handles = axis.plot(*thinned(t.time_s, t.measured_f0), **_DATA_LINE)
     for values, look in zip(models, LINES, strict=False):
         handles += axis.plot(*thinned(t.time_s, values), **look)
     return list(handles)

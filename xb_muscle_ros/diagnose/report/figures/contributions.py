@@ -8,6 +8,7 @@ from typing import Any
 from xb_muscle_ros.diagnose.component import Component, Kind
 from xb_muscle_ros.diagnose.report import phrases as say
 from xb_muscle_ros.diagnose.report.figures.common import (
+    KIND_LOOKS,
     WIDTH_MM,
     Figure,
     finite,
@@ -24,7 +25,7 @@ from xb_muscle_ros.diagnose.report.figures.common import (
 )
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
-from xb_muscle_ros.plotting.style import MODEL, SECOND, figure
+from xb_muscle_ros.plotting.style import figure
 
 _TRIALS, _PARTS = 3, 6
 _LENGTH_MM, _FORCE_MM, _PART_MM, _RESIDUAL_MM = 9.0, 34.0, 13.5, 17.0
@@ -100,12 +101,9 @@ def _column(column: Sequence[Any], t: TrialTraces, shown: Sequence[Component], m
             axis.text(0.5, 0.5, "not in this fibre", transform=axis.transAxes, ha="center", va="center", fontsize=7)
             continue
         time_s, adds = thinned(t.time_s, 100.0 * t.adds_f0(c.name))
-        mechanism = c.kind is Kind.MECHANISM
-        axis.fill_between(
-            time_s, 0.0, adds, facecolor=MODEL if mechanism else "white", edgecolor=MODEL if mechanism else SECOND,
-            alpha=0.35 if mechanism else 1.0, hatch=None if mechanism else "/////", linewidth=0.0,
-        )  # fmt: skip
-        axis.plot(time_s, adds, color=MODEL if mechanism else SECOND, linewidth=0.9)
+        look = KIND_LOOKS[c.kind]
+        axis.fill_between(time_s, 0.0, adds, alpha=0.35 if c.kind is Kind.MECHANISM else 1.0, linewidth=0.0, **look)
+        axis.plot(time_s, adds, color=look["edgecolor"], linewidth=0.9)
     return plot_force(column[1], t, both)
 
 

@@ -9,9 +9,18 @@ import numpy as np
 
 from xb_muscle_ros.diagnose.component import NAMED, SURE, Component, HeldOutGain, Kind
 from xb_muscle_ros.diagnose.report import phrases as say
-from xb_muscle_ros.diagnose.report.figures.common import WIDTH_MM, Figure, finite, quiet_rows, shown_of, svg, wrapped
+from xb_muscle_ros.diagnose.report.figures.common import (
+    KIND_LOOKS,
+    WIDTH_MM,
+    Figure,
+    finite,
+    quiet_rows,
+    shown_of,
+    svg,
+    wrapped,
+)
 from xb_muscle_ros.diagnose.result import Diagnosis
-from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure
+from xb_muscle_ros.plotting.style import DATA, figure
 
 _MOST, _ROW_MM = 14, 6.4
 _PERCENT = (-200, -100, -50, -20, -10, -5, -2, -1, 0, 1, 2, 5, 10, 20, 30, 40, 50, 60, 70, 80, 90)
@@ -31,13 +40,13 @@ def draw_probabilities(d: Diagnosis) -> Figure | None:
         for place, c in enumerate(shown):
             _bar(axes[0], place, c)
             if tried and c.heldout_gain is not None:
-                _gain(axes[1], place, c.heldout_gain, _colour(c))
+                _gain(axes[1], place, c.heldout_gain, KIND_LOOKS[c.kind]["edgecolor"])
         _probability_axis(axes[0], shown)
         if tried:
             _gain_axis(axes[1])
         kinds = [
-            Patch(facecolor=MODEL, edgecolor=MODEL, label="mechanism"),
-            Patch(facecolor="white", edgecolor=SECOND, hatch="/////", label="measurement artefact"),
+            Patch(label="mechanism", **KIND_LOOKS[Kind.MECHANISM]),
+            Patch(label="measurement artefact", **KIND_LOOKS[Kind.ARTEFACT]),
         ]
         made.legend(handles=kinds, loc="outside upper center", ncols=2, frameon=False)
         return Figure(
@@ -57,19 +66,11 @@ def _caption(d: Diagnosis, shown: int, tried: bool) -> str:
     )
 
 
-def _colour(c: Component) -> str:
-    return MODEL if c.kind is Kind.MECHANISM else SECOND
-
-
 def _bar(axis: Any, place: int, c: Component) -> None:
     value = c.inclusion_probability
     if not math.isfinite(value):
         return
-    mechanism = c.kind is Kind.MECHANISM
-    axis.barh(
-        [place], [value], height=0.56, facecolor=MODEL if mechanism else "white", edgecolor=_colour(c), linewidth=0.9,
-        hatch=None if mechanism else "/////",
-    )  # fmt: skip
+    axis.barh([place], [value], height=0.56, linewidth=0.9, **KIND_LOOKS[c.kind])
     axis.text(1.03, place, say.probability(value), ha="left", va="center", fontsize=7, clip_on=False)
 
 

@@ -11,7 +11,6 @@ import numpy as np
 
 from xb_muscle_ros.diagnose.report.figures.common import (
     WIDTH_MM,
-    Array,
     Figure,
     Key,
     by_activation,
@@ -26,6 +25,7 @@ from xb_muscle_ros.diagnose.residual import ResidualMap
 from xb_muscle_ros.diagnose.result import Diagnosis
 from xb_muscle_ros.diagnose.words import phase_words
 from xb_muscle_ros.plotting.style import figure
+from xb_muscle_ros.trials.trial import Array
 
 _TRIALS, _PHASES = 36, 8
 _ROW_MM = 5.2

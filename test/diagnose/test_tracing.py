@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from xb_muscle_ros.diagnose.inference.direction import direction
 from xb_muscle_ros.diagnose.noise.cells import Residual
+from xb_muscle_ros.diagnose.tracing import direction
 from xb_muscle_ros.trials.trial import Phase
 
 PHASES = (
@@ -33,7 +33,7 @@ def adds(**levels: float) -> npt.NDArray[np.float64]:
 
 
 def told(*trials: npt.NDArray[np.float64]) -> str:
-    return direction({"fibre": [(residual(), trial) for trial in trials]})
+    return direction([(residual(), trial) for trial in trials])
 
 
 def test_where_it_raises_most_and_where_it_lowers_most() -> None:
@@ -57,11 +57,11 @@ def test_less_than_can_be_told_is_said_to_be(size: float) -> None:
     assert told(adds(hold=size)) == "changes force by less than 0.05 % F0 on average in every phase"
 
 
-def test_trials_and_fibres_are_averaged() -> None:
-    both = direction({"a": [(residual(), adds(hold=0.02))], "b": [(residual(), adds(hold=0.0))]})
+def test_trials_are_averaged() -> None:
+    both = direction([(residual(), adds(hold=0.02)), (residual(), adds(hold=0.0))])
     assert both == told(adds(hold=0.01))
 
 
 def test_without_phases_there_is_nothing_to_say() -> None:
-    assert direction({"a": [(residual(()), adds(hold=0.02))]}) == ""
-    assert direction({}) == ""
+    assert direction([(residual(()), adds(hold=0.02))]) == ""
+    assert direction([]) == ""

@@ -12,8 +12,7 @@ from made_trials import truth
 from xb_muscle_ros.diagnose import next_experiment
 from xb_muscle_ros.diagnose.component import Component, Kind
 from xb_muscle_ros.diagnose.names import FAMILY, Name
-from xb_muscle_ros.diagnose.next_experiment import menu, propose, scaled
-from xb_muscle_ros.diagnose.planning import _pairs
+from xb_muscle_ros.diagnose.next_experiment import _pairs, menu, propose, scaled
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import changed
 from xb_muscle_ros.models.muscle import Muscle
@@ -26,7 +25,7 @@ DRAG, TITIN, STIFFNESS, SHIFT = (
 
 def component(probability: float, *names: Name) -> Component:
     kind = Kind.ARTEFACT if names[0] is SHIFT else Kind.MECHANISM
-    return Component(names[0].value, kind, FAMILY[names[0]], tuple(n.value for n in names), probability)
+    return Component(names[0], kind, FAMILY[names[0]], names, probability)
 
 
 SETS: dict[Any, float] = {(): 0.0, (DRAG,): 3.0, (TITIN,): 2.5, (DRAG, TITIN): 2.8, (DRAG, SHIFT): 2.9}
