@@ -87,9 +87,6 @@ def run(arguments: argparse.Namespace) -> int:
     fibres = fibres_of(arguments.fiber, arguments.models, MODELS)
     reflex = loop_reflex.reflex_of(arguments)
     pairs = [(fibre, each) for fibre in fibres for each in ((NO_REFLEX, reflex) if reflex.works else (NO_REFLEX,))]
-    if reflex.works and (None, reflex) in pairs:
-        pairs.remove((None, reflex))
-        common.warn("model mujoco has no reflex in the scene myolegs and is run without")
     body = Body()
     # What does not fit is told before anything takes time.
     ReflexArc(reflex, body.muscles, body.tick_s)

@@ -10,9 +10,11 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.plant.activation import reflex_calcium
+from xb_muscle_ros.plant.activation import ReflexActivation, reflex_calcium
+from xb_muscle_ros.plant.drives import OWN
 from xb_muscle_ros.plant.leg.body import Body
 from xb_muscle_ros.plant.leg.stance import Stance
+from xb_muscle_ros.plant.mjcf.actuators import read_muscles
 from xb_muscle_ros.plant.mjcf.muscles import CrossBridgeMuscles
 from xb_muscle_ros.plant.plant import Array
 from xb_muscle_ros.plant.reflex import NO_REFLEX, Reflex, ReflexArc, ReflexLoop
@@ -35,31 +37,49 @@ class Drive(Protocol):
 
 
 class OwnMuscles:
-    """MuJoCo's muscle actuators: no memory, constant activation."""
-
-    model = "mujoco"
+    """MuJoCo's muscle actuators: no memory, constant activation but for a reflex."""
 
     def __init__(self, body: Body, stance: Stance, reflex: Reflex = NO_REFLEX) -> None:
         """Take the stance's activations.
 
+        Args:
+            body, stance: to hold.
+            reflex: of the muscles.
+
         Raises:
-            UserError: a reflex, which the scene does not have for MuJoCo's muscle.
+            UserError: the reflex does not fit.
         """
-        if reflex.works:
-            raise UserError(
-                "in the scene myolegs MuJoCo's own muscle has no reflex; drop the reflex, or leave model mujoco out"
-            )
+        self.model = f"{OWN}, reflex" if reflex.works else OWN
         self._body, self._activation = body, stance.activation
+        self._arc = functools.partial(ReflexArc, reflex, body.muscles, body.tick_s)
+        self._arc()
+        self._works = reflex.works
+        self._f0_n = read_muscles(body.model).f0_n
+        self._level: Array = stance.activation
+        self._reflex: ReflexLoop | None = None
         names = zip(body.muscles, stance.activation.tolist(), strict=True)
         self.driven_by = {"activation": dict(names)}
 
     def reset(self) -> None:
         """Activate."""
-        self._body.data.act[:] = self._activation
-        self._body.data.ctrl[:] = self._activation
+        stage = ReflexActivation(self._activation, self._body.tick_s)
+        self._reflex = ReflexLoop(self._arc(), self._activation, stage) if self._works else None
+        self._activate(self._activation)
 
     def advance(self) -> None:
-        """MuJoCo computes force within its step."""
+        """MuJoCo computes force within its step; a reflex has to know it before."""
+        if self._reflex is None:
+            return
+        body = self._body
+        self._activate(self._level)
+        body.mj.mj_fwdActuation(body.model, body.data)
+        length_l0 = body.data.actuator_length / body.l0_m
+        self._level = self._reflex.observe(length_l0, -body.data.actuator_force / self._f0_n)
+
+    def _activate(self, activation: Array) -> None:
+        self._level = activation
+        self._body.data.act[:] = activation
+        self._body.data.ctrl[:] = activation
 
 
 class FibreMuscles:
