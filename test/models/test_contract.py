@@ -10,6 +10,9 @@ import pytest
 from scipy.integrate import quad
 
 from xb_muscle_ros.errors import StateViolation
+from xb_muscle_ros.mechanisms import Quantities
+from xb_muscle_ros.mechanisms.extras.active_force_length import ActiveForceLength
+from xb_muscle_ros.mechanisms.extras.passive_force_length import PassiveForceLength
 from xb_muscle_ros.models.composition import Composition
 from xb_muscle_ros.models.fibre_file import Fibre, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
@@ -123,6 +126,14 @@ def test_force_grows_with_calcium(muscle: Muscle) -> None:
     assert np.all(np.diff(forces) > 0.0)
 
 
+def at_length(change: float, v: Mapping[str, float]) -> tuple[float, float]:
+    """Share of active force and passive cross-bridge force of half-sarcomeres; 1 and 0 without such relations."""
+    if "fp_max" not in v:
+        return 1.0, 0.0
+    q = Quantities({**v, "sarcomere_change": change}, "test", None)
+    return float(ActiveForceLength().force_share(q)[0]), float(PassiveForceLength().inner_force(q))
+
+
 def compliance(force: float, v: Mapping[str, float]) -> float:
     """Of the smoothed series spring, power strokes per cross-bridge force."""
     sharp = v["smoothing"]
@@ -150,7 +161,8 @@ def test_both_elements_bear_the_same_force(muscle: Muscle) -> None:
         if "vmax" in v:
             # A third way to the force: by the velocity of the contractile element.
             y = v["e2"] * v["gamma"] * out.ce_velocity_l0_per_s / v["vmax"] + v["e3"]
-            assert force_xb == pytest.approx(out.n_on * (v["e1"] * np.arcsinh(y) + v["e4"]), abs=1e-9)
+            share, passive = at_length(out.ce_length_change_l0, v)
+            assert force_xb == pytest.approx(share * out.n_on * (v["e1"] * np.arcsinh(y) + v["e4"]) + passive, abs=1e-9)
         if v["smoothing"] == 0.0:
             series = v["kse0"] * np.expm1(v["kse"] * extension) if extension > 0.0 else v["kse"] * v["kse0"] * extension
             assert abs(series - force_xb) < 1e-12

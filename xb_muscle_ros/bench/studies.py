@@ -41,6 +41,8 @@ STUDIES = {
     "node": Study("lateness of a realtime node, beside a plain timer", "node_timing", "realtime"),
     "roundtrip": Study("from length message to force message and back", "node_timing", "roundtrip"),
     "many": Study("a node of many fibres", "node_timing", "many"),
+    "body": Study("a tick of a leg with 80 muscles, beside MuJoCo's own", "body"),
+    "moments": Study("isometric joint moments beside MuJoCo's own muscles", "joint_moments", draws="joint_moments"),
     "soak": Study("millions of lockstep ticks: force balance, memory", "soak"),
 }
 

@@ -13,6 +13,8 @@ from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.inputs import check_many
 from xb_muscle_ros.models.muscle import GUARD, SCRATCH_ROWS, Array, Muscle, Outputs
 
+_NO_TABLE = np.empty((0, len(Outputs._fields)))
+
 
 class MuscleBatch:
     """Fibres of one model and one method, stepped together on all cores.
@@ -112,16 +114,36 @@ class MuscleBatch:
             UserError: of the first fibre whose length or calcium is out of range, or the duration is.
             StateViolation: of the first fibre that has one; no other fibre's state is lost, since none was changed.
         """
+        out = np.empty_like(states)
+        self.step_into(states, length_change_l0, calcium_um, dt_s, out)
+        return out
+
+    def step_into(
+        self,
+        states: Array,
+        length_change_l0: Array,
+        calcium_um: Array,
+        dt_s: float,
+        out: Array,
+        table: Array = _NO_TABLE,
+    ) -> None:
+        """The same as `step` and `output_table` in one pass, into arrays that are there already.
+
+        Args:
+            states, length_change_l0, calcium_um, dt_s: see `step`.
+            out: receives the states; another array than `states`.
+            table: receives the outputs, shape (fibres, 11); without rows: none.
+
+        Raises:
+            UserError, StateViolation: see `step`; `out` and `table` then hold nothing of use.
+        """
         length = np.ascontiguousarray(length_change_l0, dtype=np.float64)
         calcium = np.ascontiguousarray(calcium_um, dtype=np.float64)
         check_many(self._names, states, self._work.shape[2], length, calcium, dt_s)
-        out = np.empty_like(states)
-        self._code.advance_many(states, length, calcium, dt_s, self._p, GUARD, out, self._work, self._report)
-        if self._report[:, 0].any():
+        if self._code.advance_many(states, length, calcium, dt_s, self._p, GUARD, out, self._work, self._report, table):
             k = int(np.flatnonzero(self._report[:, 0])[0])
             code, fault, time_s = self._report[k]
             self.muscles[k].complain(int(code), int(fault), float(time_s), out[k])
-        return out
 
     def outputs(self, states: Array) -> dict[str, Array]:
         """Outputs by name of `Outputs`, each of shape (fibres,)."""

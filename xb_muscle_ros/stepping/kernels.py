@@ -308,8 +308,9 @@ def outputs_of(states: Array, p: Array, table: Array) -> None:
 
 # PARALLEL
 def advance_many(
-    s: Array, length_end: Array, calcium: Array, dt: float, p: Array, tol: float, out: Array, work: Array, report: Array
-) -> None:
+    s: Array, length_end: Array, calcium: Array, dt: float, p: Array, tol: float, out: Array, work: Array,
+    report: Array, table: Array,
+) -> int:  # fmt: skip
     """One fixed step of `dt` for many fibres, spread over the cores; each is what `advance` makes of it, to the bit.
 
     Args:
@@ -319,13 +320,24 @@ def advance_many(
         out: receives states, shape (fibres, n).
         work: scratch, shape (threads, 13, n).
         report: receives code, index of the state at fault and time reached in s, shape (fibres, 3).
+        table: receives outputs at the new states, a row each, or has no rows.
+
+    Returns:
+        how many fibres failed.
     """
+    failed = 0
+    wanted = table.shape[0] > 0
     for k in prange(s.shape[0]):
         scratch = work[get_thread_id()]
         code, fault, t, _, _, _ = advance(s[k], length_end[k], calcium[k], dt, p[k], dt, tol, out[k], scratch)
         report[k, 0] = code
         report[k, 1] = fault
         report[k, 2] = t
+        if code != OK:
+            failed += 1
+        elif wanted:
+            outputs(out[k], p[k], table[k])
+    return failed
 
 
 # PARALLEL

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.plant.mjcf.actuators import MuscleActuators
 from xb_muscle_ros.plant.mjcf.kernels import next_activation
 from xb_muscle_ros.plant.plant import Array
@@ -24,6 +25,7 @@ class ActivationDynamics:
             *muscles.excitation_range.T,
             *muscles.activation_range.T,
         )
+        self._names = muscles.names
         self._rows: Array = np.ascontiguousarray(np.stack(columns, axis=1))
 
     def after(self, activation: Array, excitation: Array, dt_s: float) -> Array:
@@ -32,7 +34,12 @@ class ActivationDynamics:
         Args:
             activation, excitation: shape (muscle,), the second clipped to its range, as MuJoCo does.
             dt_s: length of the step, s.
+
+        Raises:
+            UserError: an excitation that is not finite.
         """
         out = np.empty_like(activation)
-        next_activation(activation, excitation, dt_s, self._rows, out)
+        k = next_activation(activation, excitation, dt_s, self._rows, out)
+        if k >= 0:
+            raise UserError(f"excitation of {self._names[k]} is {excitation[k]}; allowed are finite numbers")
         return out

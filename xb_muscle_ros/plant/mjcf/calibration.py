@@ -16,11 +16,11 @@ from xb_muscle_ros.plant.plant import Array
 
 RELATIONS = ("active_force_length", "passive_force_length")
 """Mechanisms that every muscle's model gets."""
-FULL_PCA, RELAXED_PCA = 4.5, 9.0
+FULL_PCA, RELAXED_PCA = 4.5, 8.0
 """Calcium of full activation, where one F0 is measured, and calcium below which activation grows in proportion."""
 POINTS = 1025
 """Of a table of calcium by activation."""
-_FIRST_POINTS, _LARGEST_RISE, _MOST_POINTS = 46, 0.01, 2000
+_FIRST_POINTS, _LARGEST_RISE, _MOST_POINTS = 36, 0.01, 2000
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 from numba import njit
@@ -13,7 +15,7 @@ _LEAST = 1e-15
 
 
 @njit(cache=True)
-def next_activation(activation: Array, excitation: Array, dt_s: float, rows: Array, out: Array) -> None:
+def next_activation(activation: Array, excitation: Array, dt_s: float, rows: Array, out: Array) -> int:
     """One explicit Euler step of `mju_muscleDynamics`.
 
     Args:
@@ -21,8 +23,13 @@ def next_activation(activation: Array, excitation: Array, dt_s: float, rows: Arr
         dt_s: s.
         rows: shape (muscle, 7): both time constants (s), width of their transition, least and most excitation, least
             and most activation.
+
+    Returns:
+        place of the first excitation that is not finite, else -1.
     """
     for k in range(activation.size):
+        if not math.isfinite(excitation[k]):
+            return k
         now = activation[k]
         wanted = min(max(excitation[k], rows[k, 3]), rows[k, 4])
         inside = min(max(now, 0.0), 1.0)
@@ -36,6 +43,7 @@ def next_activation(activation: Array, excitation: Array, dt_s: float, rows: Arr
             constant = falling + (rising - falling) * _sigmoid(rise / width + 0.5)
         changed = now + rise / max(_LEAST, constant) * dt_s
         out[k] = min(max(changed, rows[k, 5]), rows[k, 6])
+    return -1
 
 
 @njit(cache=True)

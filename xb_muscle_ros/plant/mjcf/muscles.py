@@ -14,7 +14,7 @@ from xb_muscle_ros.plant.mjcf.activation import ActivationDynamics
 from xb_muscle_ros.plant.mjcf.actuators import make_plain, read_muscles
 from xb_muscle_ros.plant.mjcf.calibration import POINTS
 from xb_muscle_ros.plant.mjcf.fibres import build
-from xb_muscle_ros.plant.mjcf.groups import Groups
+from xb_muscle_ros.plant.mjcf.groups import Groups, members_of
 from xb_muscle_ros.plant.mjcf.kernels import looked_up
 from xb_muscle_ros.plant.mjcf.table import Table, choices
 from xb_muscle_ros.plant.plant import Array
@@ -35,6 +35,7 @@ class CrossBridgeMuscles:
         f0_n, l0_m: peak isometric force, N, and optimal fibre length, m, shape (muscle,).
         slack_m: length of the tendon, m, shape (muscle,); below 0 where the model's numbers leave none.
         fibres: one for each muscle.
+        fibre_groups: what steps them.
         activation: of the moment, 0 to 1, shape (muscle,).
 
     Source:
@@ -42,11 +43,15 @@ class CrossBridgeMuscles:
 
     Examples:
         >>> import mujoco, xb_muscle_ros as xb
-        >>> model = mujoco.MjModel.from_xml_path("arm.xml")  # doctest: +SKIP
-        >>> data = mujoco.MjData(model)  # doctest: +SKIP
-        >>> muscles = xb.CrossBridgeMuscles(model)  # doctest: +SKIP
-        >>> muscles.reset(data, muscles.calcium_um(0.1))  # doctest: +SKIP
-        >>> pull_n = muscles.step(data, excitation=0.5)  # doctest: +SKIP
+        >>> model = mujoco.MjModel.from_xml_string(
+        ...     '<mujoco><worldbody><body><joint name="hinge" axis="0 1 0"/><geom size=".1"/></body></worldbody>'
+        ...     '<actuator><muscle joint="hinge" lengthrange="-1 1" force="20"/></actuator></mujoco>'
+        ... )
+        >>> data = mujoco.MjData(model)
+        >>> muscles = xb.CrossBridgeMuscles(model)
+        >>> pull_n = muscles.reset(data, muscles.calcium_um(0.1))
+        >>> muscles.step(data, 0.5).shape  # excitation of all muscles; pulls, N
+        (1,)
     """
 
     def __init__(self, model: Any, table: Table = None) -> None:
@@ -73,7 +78,8 @@ class CrossBridgeMuscles:
         self._optimal_m, self._per_l0 = muscles.optimal_m, 1.0 / muscles.l0_m
         self._dynamics = ActivationDynamics(muscles)
         self._early = muscles.early if muscles.early.any() else None
-        self._groups = Groups(built.fibres)
+        self.fibre_groups = Groups(built.fibres)
+        self._place = members_of(muscles.index)
         self.activation: Array = np.zeros(len(self.names))
         for line in (*muscles.warnings, *built.warnings):
             warnings.warn(line, DataWarning, stacklevel=2)
@@ -90,7 +96,7 @@ class CrossBridgeMuscles:
 
     def length_change_l0(self, data: Any) -> Array:
         """Length of fibre and tendon beyond optimal fibre and slack tendon, shape (muscle,), L0; 0 is optimal."""
-        change: Array = (data.actuator_length[self.index] - self._optimal_m) * self._per_l0
+        change: Array = (data.actuator_length[self._place] - self._optimal_m) * self._per_l0
         return change
 
     def calcium_um(self, activation: npt.ArrayLike) -> Array:
@@ -133,7 +139,7 @@ class CrossBridgeMuscles:
         """
         calcium = self._each("calcium", calcium_um)
         self._mj.mj_fwdPosition(self._model, data)
-        force = self._groups.settle(self.length_change_l0(data), calcium)
+        force = self.fibre_groups.settle(self.length_change_l0(data), calcium)
         rows = [self._tables[row] for row in self._table]
         self.activation = np.array([np.interp(c, row, _LEVELS) for c, row in zip(calcium, rows, strict=True)])
         return self._pull(data, force)
@@ -152,8 +158,7 @@ class CrossBridgeMuscles:
             UserError: a length or calcium that no fibre has; names the muscle.
             StateViolation: a fibre's state left its bounds.
         """
-        timestep_s = float(self._model.opt.timestep)
-        return self._pull(data, self._groups.advance(self.length_change_l0(data), calcium_um, timestep_s))
+        return self._pull(data, self.fibre_groups.advance(self.length_change_l0(data), calcium_um, self._timestep_s))
 
     def step(self, data: Any, excitation: npt.ArrayLike) -> Array:
         """One step of model and muscles, in place of `mj_step`.
@@ -171,8 +176,7 @@ class CrossBridgeMuscles:
             UserError, StateViolation: see `advance`; or an excitation that is not finite.
         """
         wanted = self._each("excitation", excitation)
-        timestep_s = float(self._model.opt.timestep)
-        after = self._dynamics.after(self.activation, wanted, timestep_s)
+        after = self._dynamics.after(self.activation, wanted, self._timestep_s)
         self._mj.mj_step1(self._model, data)
         acting = self.activation if self._early is None else np.where(self._early, after, self.activation)
         pull = self.advance(data, self._calcium(acting))
@@ -182,11 +186,15 @@ class CrossBridgeMuscles:
 
     def outputs(self) -> dict[str, Array]:
         """What all fibres show now, by name of `Outputs`, each of shape (muscle,)."""
-        return self._groups.outputs()
+        return self.fibre_groups.outputs()
+
+    @property
+    def _timestep_s(self) -> float:
+        return float(self._model.opt.timestep)
 
     def _pull(self, data: Any, force_f0: Array) -> Array:
         pull: Array = self.f0_n * force_f0
-        data.ctrl[self.index] = -pull
+        data.ctrl[self._place] = -pull
         return pull
 
     def _calcium(self, activation: Array) -> Array:
@@ -210,7 +218,5 @@ class CrossBridgeMuscles:
         if values.ndim == 0 or values.shape == (1,) != (count,):
             values = np.full(count, float(values.flat[0]))
         if values.shape != (count,):
-            raise UserError(
-                f"{what} has shape {values.shape}; needed is ({count},), a value for each muscle, or one number"
-            )
+            raise UserError(f"{what} has shape {values.shape}; needed is ({count},) or one number")
         return values

@@ -118,7 +118,7 @@ def _changed(choice: Choice, entry: Any, where: str) -> Choice:
         if not isinstance(value, (str, Path)):
             raise UserError(f"{where}: {key} is {value!r}; needed is text")
     if given.get("tendon", choice.tendon) not in TENDONS:
-        raise UserError(f"{where}: tendon '{given['tendon']}' is not known{suggest(str(given['tendon']), TENDONS)}")
+        raise UserError(f"{where}: tendon '{given['tendon']}' is not known; allowed are {' and '.join(TENDONS)}")
     merged = MappingProxyType({**choice.parameters, **parameters})
     return replace(choice, **{key: str(value) for key, value in given.items()}, parameters=merged)
 

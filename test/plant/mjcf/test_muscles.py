@@ -1,0 +1,170 @@
+"""Fibres in a MuJoCo model: their isometric force, their steps, and what is refused."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import xb_muscle_ros as xb
+from xb_muscle_ros.errors import DataWarning, UserError
+from xb_muscle_ros.models.batch import MuscleBatch
+from xb_muscle_ros.plant.mjcf.muscles import CrossBridgeMuscles
+
+mujoco = pytest.importorskip("mujoco")
+
+MIXED = {"groups": {"soleus_*": {"model": "hill"}, "*_l": {"tendon": "rigid"}}}
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+def at_posture(model: Any, seed: int) -> Any:
+    """Somewhere near the standing leg."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = model.key_qpos[0]
+    data.qpos[7:] += np.random.default_rng(seed).uniform(-0.2, 0.2, model.nq - 7)
+    mujoco.mj_forward(model, data)
+    return data
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tendon", ["rigid", "elastic"])
+def test_every_muscle_is_as_strong_as_mujocos_at_several_postures(leg: Any, tendon: str) -> None:
+    """Fully activated, to 5 % of its force or of a tenth of F0."""
+    own = copy.copy(leg)
+    muscles = CrossBridgeMuscles(leg, {"default": {"tendon": tendon}})
+    data = mujoco.MjData(own)
+    for seed in range(4):
+        at = at_posture(leg, seed)
+        data.qpos[:] = at.qpos
+        data.act[:] = 1.0
+        mujoco.mj_forward(own, data)
+        expected = -data.actuator_force[muscles.index]
+        found = muscles.isometric_force_n(at, 1.0)
+        assert (np.abs(found - expected) <= 0.05 * np.maximum(expected, 0.1 * muscles.f0_n)).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("table", [{}, {"default": {"tendon": "elastic"}}, MIXED], ids=["rigid", "elastic", "mixed"])
+@pytest.mark.filterwarnings("ignore::xb_muscle_ros.errors.DataWarning")
+def test_fibres_settle_at_the_isometric_force(leg: Any, table: dict[str, Any]) -> None:
+    muscles = CrossBridgeMuscles(leg, table)
+    data = at_posture(leg, 1)
+    for activation in (0.0, 0.3, 1.0):
+        pulls = muscles.reset(data, muscles.calcium_um(activation))
+        assert (data.ctrl[muscles.index] == -pulls).all()
+        expected = muscles.isometric_force_n(data, activation)
+        np.testing.assert_allclose(pulls / muscles.f0_n, expected / muscles.f0_n, atol=3e-3)
+        np.testing.assert_allclose(muscles.activation, activation, atol=2e-3)
+
+
+def test_a_hanging_arm_settles_and_its_ticks_repeat_to_the_bit(arm: Callable[..., Any]) -> None:
+    def run() -> bytes:
+        model = arm()
+        muscles, data = CrossBridgeMuscles(model), mujoco.MjData(model)
+        muscles.reset(data, muscles.calcium_um(0.1))
+        pulls = [muscles.step(data, (0.3 * (k > 50), 0.05)) for k in range(200)]
+        assert (pulls[-1] > 0.0).all()
+        return b"".join([*(pull.tobytes() for pull in pulls), data.qpos.tobytes()])
+
+    assert run() == run()
+
+
+@pytest.mark.slow
+def test_muscles_are_fibres_of_a_batch_to_the_bit(leg: Any) -> None:
+    """Eighty together, of two models, are what each is alone."""
+    muscles = CrossBridgeMuscles(leg, {"groups": {"soleus_*": {"model": "3state_coop_rigid"}}})
+    data = at_posture(leg, 2)
+    calcium = muscles.calcium_um(np.linspace(0.05, 0.5, len(muscles)))
+    muscles.reset(data, calcium)
+    alone = [MuscleBatch([fibre]) for fibre in muscles.fibres]
+    length = muscles.length_change_l0(data)
+    states = [b.settle(length[k : k + 1], calcium[k : k + 1]) for k, b in enumerate(alone)]
+    for _ in range(20):
+        mujoco.mj_step1(leg, data)
+        pulls = muscles.advance(data, calcium)
+        mujoco.mj_step2(leg, data)
+        length = muscles.length_change_l0(data)
+        # The step was to the length before `mj_step2`, which moves the body but leaves lengths.
+        states = [
+            b.step(s, length[k : k + 1], calcium[k : k + 1], 1e-3)
+            for k, (b, s) in enumerate(zip(alone, states, strict=True))
+        ]
+        each = np.array([b.outputs(s)["force_f0"][0] for b, s in zip(alone, states, strict=True)])
+        assert (muscles.f0_n * each).tobytes() == pulls.tobytes()
+    shown = muscles.outputs()
+    assert (shown["force_f0"] * muscles.f0_n).tobytes() == pulls.tobytes()
+
+
+def test_activation_is_mujocos_and_acts_from_the_beginning_of_a_step(arm: Callable[..., Any]) -> None:
+    model = arm()
+    own = copy.copy(model)
+    muscles, data, theirs = CrossBridgeMuscles(model), mujoco.MjData(model), mujoco.MjData(own)
+    muscles.reset(data)
+    assert (muscles.activation == 0.0).all()
+    for k in range(100):
+        theirs.ctrl[:] = (0.8, 0.1 * (k % 3))
+        muscles.step(data, theirs.ctrl)
+        mujoco.mj_step(own, theirs)
+        assert muscles.activation.tobytes() == theirs.act.tobytes()
+
+
+def test_a_change_of_length_that_no_fibre_has_leaves_the_states(arm: Callable[..., Any]) -> None:
+    model = arm()
+    muscles, data = CrossBridgeMuscles(model), mujoco.MjData(model)
+    muscles.reset(data, 1.0)
+    before = muscles.outputs()["force_f0"]
+    mujoco.mj_step1(model, data)
+    data.actuator_length[1] = -5.0
+    with pytest.raises(UserError, match=r"fibre extensor: length change is .* allowed is -1 to 10"):
+        muscles.advance(data, np.ones(2))
+    assert muscles.outputs()["force_f0"].tobytes() == before.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (np.nan, "excitation of flexor is nan; allowed are finite numbers"),
+        ((0.1, np.inf), "excitation of extensor is inf"),
+        ((0.1, 0.2, 0.3), r"excitation has shape \(3,\); needed is \(2,\) or one number"),
+        ("much", "excitation is no array of numbers"),
+    ],
+)
+def test_excitation_that_is_none_is_refused(arm: Callable[..., Any], given: Any, said: str) -> None:
+    model = arm()
+    muscles, data = CrossBridgeMuscles(model), mujoco.MjData(model)
+    muscles.reset(data)
+    with pytest.raises(UserError, match=said):
+        muscles.step(data, given)
+    assert data.time == 0.0
+
+
+def test_activation_beyond_its_range_is_refused(arm: Callable[..., Any]) -> None:
+    muscles = CrossBridgeMuscles(arm())
+    with pytest.raises(UserError, match=r"activation of extensor is 1.2; allowed is 0 to 1"):
+        muscles.calcium_um((0.5, 1.2))
+
+
+def test_a_model_that_is_refused_stays_as_it_is(arm: Callable[..., Any]) -> None:
+    model = arm()
+    before = model.actuator_gaintype.copy(), model.actuator_actadr.copy()
+    with pytest.raises(UserError, match="no muscle 'flexr'; did you mean 'flexor'"):
+        CrossBridgeMuscles(model, {"muscles": {"flexr": {}}})
+    with pytest.raises(UserError, match=r"muscle flexor: model hill.* has no series element"):
+        CrossBridgeMuscles(model, {"default": {"model": "hill", "tendon": "elastic"}})
+    assert (model.actuator_gaintype == before[0]).all()
+    assert (model.actuator_actadr == before[1]).all()
+
+
+def test_tendons_that_have_no_length_and_force_ranges_are_told(arm: Callable[..., Any]) -> None:
+    model = arm(first='lengthrange="0.2 0.35" range="1.0 1.4" force="500" forcelimited="true" forcerange="-100 0"')
+    with pytest.warns(DataWarning) as told:
+        CrossBridgeMuscles(model, {"default": {"tendon": "elastic"}})
+    lines = sorted(str(line.message) for line in told)
+    assert [line.split(":")[0] for line in lines] == ["flexor", "force ranges of flexor are left out"]
+
+
+def test_the_public_name_is_this_class() -> None:
+    assert xb.CrossBridgeMuscles is CrossBridgeMuscles
