@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     common.add_out(parser, "folder for loop.json, loop.csv and the figure")
     parser.add_argument(
-        "--duration", type=float, metavar="S", help="length of the run, s (default: ankle 0.5, knee 4, myolegs 1)"
+        "--duration", type=float, metavar="S", help="length of the run, s (default: ankle 0.5, knee 4, myolegs 2)"
     )
     parser.add_argument(
         "--elastic-tendon", action="store_true", help="tendons stretch (default: rigid, as with a muscle_node)"

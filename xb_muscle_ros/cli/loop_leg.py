@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.live and (len(arguments.models or ()) != 1 or arguments.models == ["mujoco"]):
         raise UserError("--live is for the one model that the node has; give one --model, and not mujoco")
     refuse_older(matching(arguments.out, r"loop\.(json|csv|png|pdf)"), arguments.overwrite)
-    duration = 1.0 if arguments.duration is None else arguments.duration
+    duration = 2.0 if arguments.duration is None else arguments.duration
     if not 0.3 <= duration <= 10.0:
         raise UserError(f"--duration is {duration:g} s; allowed in the scene myolegs is 0.3 to 10")
     platform = RampAndHold(**platform_values(arguments))

@@ -192,7 +192,8 @@ def _optimised(body: Body, aim: Aim, start: Array) -> tuple[Array, Array]:
                 [_LEAD_PER_M * (aim.lead_m - at[0])],
             )
         )
-        found = lsq_linear(rows, wanted, (lower, np.ones(directions + half)), method="bvls", tol=1e-14).x
+        # Followed untyped, SciPy's function has the name of its module.
+        found = lsq_linear(rows, wanted, (lower, np.ones(directions + half)), method="bvls", tol=1e-14).x  # type: ignore[operator]
         change, gain = found[:directions], found[directions:] - activation
         share = min(1.0, _LARGEST_M / _largest(by_measure[1:] @ change), _LARGEST_RAD / _largest(change))
         posture = body.moved(posture, share * along @ change)
