@@ -19,7 +19,7 @@ curves = st.tuples(st.floats(0.0, 0.95), st.floats(1.05, 4.0), st.floats(-0.5, 0
 
 
 def quantities(change: float, fl_min: float, fl_max: float, optimum: float = 0.0, fp_max: float = 1.3) -> Quantities:
-    values = {"fl_min": fl_min, "fl_max": fl_max, "fl_optimum": optimum, "fp_max": fp_max}
+    values = {"fl_min": fl_min, "fl_max": fl_max, "fl_optimum": optimum, "fp_max": fp_max, "fp_onset": 0.0}
     return Quantities({**values, "sarcomere_change": change, "Fscale": FSCALE, "gamma": GAMMA}, "test", None)
 
 

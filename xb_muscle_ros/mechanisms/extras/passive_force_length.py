@@ -8,19 +8,25 @@ FP_MAX = Parameter(
     100.0, 1.3, "MuJoCo 3, mju_muscleBias (fpmax)",
 )  # fmt: skip
 
+FP_ONSET = Parameter(
+    "fp_onset", "L0", "length of half-sarcomeres beyond their optimum where passive force begins", -0.7, 1.0, 0.0,
+    "MuJoCo 3, mju_muscleBias: at the optimum",
+)  # fmt: skip
+
 
 class PassiveForceLength(Extra):
     """F = fp_max (w²/2 + (y - 1)+) with w = min(y, 1): a parabola up to y = 1, then its tangent.
 
-    y is 2 (L - 1)+/(fl_max - 1), with L = 1 + ΔS - fl_optimum and ΔS the half-sarcomeres' length change. Beside the
-    heads and within the half-sarcomeres, it stretches the series element as they do. The curve is that of MuJoCo's
-    engine, which has 1.5 fp_max at fl_max.
+    y is 2 (L - 1 - fp_onset)+/(fl_max - 1), with L = 1 + ΔS - fl_optimum and ΔS the half-sarcomeres' length change.
+    Beside the heads and within the half-sarcomeres, it stretches the series element as they do. The curve is that of
+    MuJoCo's engine, which has 1.5 fp_max at fl_max. An onset of its own is for muscles on a spring, whose optimum is
+    where they pull hard and whose passive force begins where nothing pulls.
     """
 
     name = "passive_force_length"
     needs = Needs.SEPARATE_LENGTHS
     geometry = True
-    parameters = (FP_MAX, FL_MAX, FL_OPTIMUM)
+    parameters = (FP_MAX, FP_ONSET, FL_MAX, FL_OPTIMUM)
 
     def inner_force(self, q: Quantities) -> Expr:
         _, w, beyond = self._stretch(q)
@@ -33,6 +39,6 @@ class PassiveForceLength(Extra):
     def _stretch(self, q: Quantities) -> tuple[Expr, Expr, Expr]:
         """Of y: its change per L0, its part up to 1, and what is beyond."""
         per_length = 2 / (q.fl_max - 1)
-        y = per_length * ops.positive(q.sarcomere_change - q.fl_optimum)
+        y = per_length * ops.positive(q.sarcomere_change - q.fl_optimum - q.fp_onset)
         beyond = ops.positive(y - 1)
         return per_length, y - beyond, beyond

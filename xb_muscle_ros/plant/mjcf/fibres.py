@@ -19,6 +19,12 @@ from xb_muscle_ros.plant.mjcf.spring import series_values, spring_of
 from xb_muscle_ros.plant.mjcf.table import Choice
 from xb_muscle_ros.plant.plant import Array
 
+_SHORT_L0, _LONG_L0 = 0.7, 1.3
+"""Lengths over which force and length are fitted even where a muscle's operating range is narrower.
+
+Models go beyond it: MyoLeg's vastus medialis, of 1.15 to 1.61 L0, is at 0.73 L0 where the knee is straight.
+"""
+
 
 @dataclass(frozen=True, eq=False)
 class Built:
@@ -65,7 +71,8 @@ def build(mj: Any, muscles: MuscleActuators, chosen: Sequence[Choice]) -> Built:
         elif choice.tendon == "elastic":
             rigid.append(name)
         own = (float(muscles.fl_min[k]), float(muscles.fl_max[k]), float(muscles.fp_max[k]))
-        low, high = np.round(muscles.range_l0[k], 3).tolist()
+        low, high = muscles.range_l0[k].tolist()
+        low, high = round(min(low, _SHORT_L0), 3), round(max(high, _LONG_L0), 3)
         values = fit(own, (low, high), spring_of(fibre)).tolist()
         fibre = changed(fibre, dict(zip(NAMES, values, strict=True)), where)
         f0_n, l0_m = float(muscles.f0_n[k]), float(muscles.l0_m[k])

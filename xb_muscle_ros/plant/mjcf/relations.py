@@ -14,7 +14,7 @@ from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.plant.mjcf.spring import spring_of
 from xb_muscle_ros.plant.plant import Array
 
-_PARAMETERS = ("fl_min", "fl_max", "fl_optimum", "fp_max")
+_PARAMETERS = ("fl_min", "fl_max", "fl_optimum", "fp_max", "fp_onset")
 _HALVINGS = 60
 _MOST_F0 = 50.0
 
@@ -26,7 +26,7 @@ class Relations:
     A fibre's length is that of its half-sarcomeres and of its series element, and all bear the same force.
 
     Attributes:
-        fl_min, fl_max, fl_optimum, fp_max: see `ActiveForceLength` and `PassiveForceLength`.
+        fl_min, fl_max, fl_optimum, fp_max, fp_onset: see `ActiveForceLength` and `PassiveForceLength`.
         series_l0, series_f0: of the series element, see `Spring`.
     """
 
@@ -34,6 +34,7 @@ class Relations:
     fl_max: Array
     fl_optimum: Array
     fp_max: Array
+    fp_onset: Array
     series_l0: Array
     series_f0: Array
 
