@@ -68,9 +68,14 @@ def _draw(path: Path, found: dict[tuple[str, str, float], Moments]) -> None:
                 for activation in _ACTIVATIONS:
                     angle = np.degrees(found[RIGID, joint.name, activation].angle_rad)
                     own = found[RIGID, joint.name, activation].own_nm[:, place]
-                    axes.plot(angle, own, color=DATA, linewidth=3.0, label="MuJoCo's own")
+                    axes.plot(angle, own, color=DATA, linewidth=3.0, label="MuJoCo's own muscles")
                     for kind, line in _LINES.items():
-                        axes.plot(angle, found[kind, joint.name, activation].fibres_nm[:, place], label=kind, **line)
+                        axes.plot(
+                            angle,
+                            found[kind, joint.name, activation].fibres_nm[:, place],
+                            label=f"fibres, {kind}",
+                            **line,
+                        )
                 axes.set_title(group)
                 axes.set_xlabel(f"{joint.title} (°)")
                 axes.set_ylabel("Moment (N·m)")

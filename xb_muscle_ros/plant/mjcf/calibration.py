@@ -30,10 +30,12 @@ class Calibration:
     Attributes:
         fibre: with `RELATIONS`, without a parallel element, and with ``Fscale`` set.
         calcium_um: for activations of 0 to 1 in equal steps, shape (`POINTS`,), µM.
+        least: activation without calcium: 0, but for Hill-type models, which have a floor.
     """
 
     fibre: Fibre
     calcium_um: Array
+    least: float
 
 
 def calibrated(choice: Choice, where: str) -> Calibration:
@@ -76,9 +78,9 @@ def calibrated(choice: Choice, where: str) -> Calibration:
             share.insert(k, force(_um(pca[k])) / full)
         else:
             k += 1
-    return Calibration(
-        whole, _turned_round(np.array(pca), np.array(share), force(0.0) / full, f"{where}: {fibre.model}")
-    )
+    least = max(force(0.0) / full, 0.0)
+    calcium = _turned_round(np.array(pca), np.array(share), least, f"{where}: {fibre.model}")
+    return Calibration(whole, calcium, least)
 
 
 def _um(pca: float) -> float:

@@ -34,6 +34,7 @@ class Built:
         fibres: one for each muscle; named after it, with its F0 and L0.
         calcium_um: tables of calcium by activation, shape (table, point), see `Calibration`.
         table: which of them each muscle has, shape (muscle,).
+        least: activation without calcium, shape (muscle,).
         relations: isometric force by length.
         warnings: lines on what was taken for granted.
     """
@@ -41,6 +42,7 @@ class Built:
     fibres: tuple[Fibre, ...]
     calcium_um: Array
     table: npt.NDArray[np.int64]
+    least: Array
     relations: Relations
     warnings: tuple[str, ...]
 
@@ -79,7 +81,8 @@ def build(mj: Any, muscles: MuscleActuators, chosen: Sequence[Choice]) -> Built:
         fibres.append(replace(fibre, name=name, f0_n=f0_n, reference_length_m=l0_m))
         table.append(row)
     calcium = np.stack([calibration.calcium_um for _, calibration in known.values()])
-    return Built(tuple(fibres), calcium, np.array(table), relations_of(fibres), _kept_rigid(rigid))
+    least = np.array([calibration.least for _, calibration in known.values()])[table]
+    return Built(tuple(fibres), calcium, np.array(table), least, relations_of(fibres), _kept_rigid(rigid))
 
 
 def _kept_rigid(names: Sequence[str]) -> tuple[str, ...]:

@@ -59,7 +59,7 @@ class JointMoments:
         self._own_data, self._plain_data = self._mj.MjData(self._own), self._mj.MjData(self._plain)
 
     def along(self, joint: str, activation: float, qpos: Array, postures: int = 31) -> Moments:
-        """Moments over the whole range of a joint, all muscles at one activation.
+        """Moments over the whole range of a joint, all muscles at one activation and at rest.
 
         Args:
             joint: a hinge with a range.
@@ -87,7 +87,8 @@ class JointMoments:
             data.qpos[:], data.qvel[:] = place, 0.0
         own.act[:] = activation
         self._mj.mj_forward(self._own, own)
-        self.muscles.reset(plain, self.muscles.calcium_um(activation))
+        self._mj.mj_fwdPosition(self._plain, plain)
+        plain.ctrl[index] = -self.muscles.isometric_force_n(plain, activation)
         self._mj.mj_forward(self._plain, plain)
         arms = self._arms(direction)
         pulls = np.stack((own.actuator_force[index], plain.actuator_force[index]))

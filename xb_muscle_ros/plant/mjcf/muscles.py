@@ -74,7 +74,7 @@ class CrossBridgeMuscles:
         self.f0_n, self.l0_m, self.slack_m = muscles.f0_n, muscles.l0_m, muscles.slack_m
         self.fibres = built.fibres
         self._relations = built.relations
-        self._tables, self._table = built.calcium_um, built.table
+        self._tables, self._table, self._least = built.calcium_um, built.table, built.least
         self._optimal_m, self._per_l0 = muscles.optimal_m, 1.0 / muscles.l0_m
         self._dynamics = ActivationDynamics(muscles)
         self._early = muscles.early if muscles.early.any() else None
@@ -122,7 +122,7 @@ class CrossBridgeMuscles:
         """
         active = self._each("activation", activation)
         self._calcium(active)
-        return self.f0_n * self._relations.force_f0(self.length_change_l0(data), active)
+        return self.f0_n * self._relations.force_f0(self.length_change_l0(data), np.maximum(active, self._least))
 
     def reset(self, data: Any, calcium_um: npt.ArrayLike = 0.0) -> Array:
         """Settle every fibre isometrically at the posture of `data`, and let it pull.
