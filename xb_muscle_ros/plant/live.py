@@ -15,8 +15,6 @@ from xb_muscle_ros.plant.muscle_end import MuscleEnd
 from xb_muscle_ros.plant.plant import Array, Plant
 from xb_muscle_ros.plant.reflex import NO_REFLEX, Reflex
 
-_ANSWER_S = 10.0
-
 
 class LiveDrive:
     """Muscles that are the fibres of a `muscle_node` in lockstep, until `close`."""
@@ -76,14 +74,7 @@ class LiveDrive:
                     "node refuses; take a shorter --duration or a smaller --displacement"
                 )
             self._end.send_length(stamp, path if self._junction is None else self._junction.length_l0)
-            force = self._end.force(stamp, _ANSWER_S)
-            if force is None:
-                why = self._end.trouble or "see its log"
-                raise UserError(
-                    f"node {self._link.peer} did not answer the length at t = {1e-9 * stamp:g} s within "
-                    f"{_ANSWER_S:g} s; {why}"
-                )
-            self._force = force
+            self._force = self._end.answer(stamp)
         if self._reflex is not None:
             self._level = self._reflex.observe(self.fibre_length_l0(), self._force)
             self._end.send_calcium(self._stamp(self._tick + self._reflex.ticks), self._reflex.ahead)

@@ -20,6 +20,7 @@ from xb_muscle_ros.node.rules import stamp_ns
 from xb_muscle_ros.plant.plant import Architecture, Array
 
 FIND_S = 10.0
+ANSWER_S = 10.0
 _HANDSHAKE_S = 1.0
 
 
@@ -118,6 +119,20 @@ class MuscleEnd:
         """Forces of a stamp (ns) in F0, waited for; None where they do not come."""
         self._link.wait_for(lambda: stamp in self.forces, timeout_s)
         return self.forces.pop(stamp, None)
+
+    def answer(self, stamp: int) -> Array:
+        """Forces of a stamp (ns) in F0.
+
+        Raises:
+            UserError: they do not come; with what the node says of itself.
+        """
+        force = self.force(stamp, ANSWER_S)
+        if force is None:
+            raise UserError(
+                f"node {self._link.peer} did not answer the length at t = {1e-9 * stamp:g} s within {ANSWER_S:g} s; "
+                f"{self.trouble or 'see its log'}"
+            )
+        return force
 
     def send_length(self, stamp: int, length_l0: Array, velocity_l0_per_s: Array | None = None) -> None:
         """Publish length changes (L0) as lengths in m, with velocities where given; stamp in ns."""

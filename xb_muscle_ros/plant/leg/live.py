@@ -16,8 +16,6 @@ from xb_muscle_ros.plant.muscle_end import MuscleEnd
 from xb_muscle_ros.plant.plant import Architecture, Array
 from xb_muscle_ros.plant.reflex import NO_REFLEX, Reflex
 
-_ANSWER_S = 10.0
-
 
 def architectures(fibres: FibreMuscles) -> tuple[Architecture, ...]:
     """Names and constants of the muscles; MyoLeg's paths have no pennation."""
@@ -67,13 +65,7 @@ class LiveFibres:
             raise UserError(f"{said}, which the node refuses")
         stamp = self._tick * self._period_ns
         self._end.send_length(stamp, length_l0)
-        force_f0 = self._end.force(stamp, _ANSWER_S)
-        if force_f0 is None:
-            why = self._end.trouble or "see its log"
-            raise UserError(
-                f"node {self._link.peer} did not answer the length at t = {1e-9 * stamp:g} s within {_ANSWER_S:g} s; "
-                f"{why}"
-            )
+        force_f0 = self._end.answer(stamp)
         if self._reflex is not None:
             self._reflex.observe(length_l0, force_f0)
             self._end.send_calcium(stamp + self._reflex.ticks * self._period_ns, self._reflex.ahead)
