@@ -18,6 +18,7 @@ from xb_muscle_ros.evaluate.sections import srs_section
 from xb_muscle_ros.evaluate.sets import gather
 from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable
 from xb_muscle_ros.models.titles import title_of
+from xb_muscle_ros.plotting import trial_pages
 from xb_muscle_ros.replay import figure as replay_figure
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
@@ -58,7 +59,7 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         found.append({"ticks": ticks, "legend": words, "titles": titles, "widths": widths, "bars": bars,
                       "heights": [axis.get_ylim() for axis in figure.axes]})  # fmt: skip
 
-    for module in (srs, force_figure, surfaces, replay_figure):
+    for module in (srs, force_figure, surfaces, trial_pages):
         monkeypatch.setattr(module, "save", look)
     return found
 

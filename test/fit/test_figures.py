@@ -15,6 +15,7 @@ from xb_muscle_ros.fit.figures import pages, profiles
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.report import as_json
 from xb_muscle_ros.fit.run import Fitted, Settings, fit
+from xb_muscle_ros.plotting import trial_pages
 from xb_muscle_ros.work import Options
 
 Drawn = Callable[..., Any]
@@ -58,8 +59,8 @@ def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Drawn:
         made.canvas.draw()
         kept.append(made)
 
-    monkeypatch.setattr(profiles, "save", keep)
-    monkeypatch.setattr(pages, "save", keep)
+    for module in (profiles, pages, trial_pages):
+        monkeypatch.setattr(module, "save", keep)
 
     def draw(rows: list[Any]) -> Any:
         profiles.draw_profiles(tmp_path / "p.png", {"parameters": rows, "level": 0.95})

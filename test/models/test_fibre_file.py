@@ -220,3 +220,14 @@ def test_every_row_of_the_table_is_complete() -> None:
         assert row.source
         assert row.lower < row.upper
         assert row.default is None or row.lower <= row.default <= row.upper
+
+
+def test_values_supply_what_a_swapped_block_lacks() -> None:
+    """The set of `2state` knows nothing of the thick filament's feedback."""
+    model = "2state+thick_filament_cooperativity"
+    with pytest.raises(UserError, match=r"needs parameter 'JF'.*add it to the set, or to --set"):
+        load_fibre("18Dec2017a", model)
+    bare, fibre = load_fibre("18Dec2017a", "2state"), load_fibre("18Dec2017a", model, values={"JF": 2.0, "f": 95.0})
+    assert (fibre.values["JF"], fibre.values["f"], fibre.values["kse"]) == (2.0, 95.0, bare.values["kse"])
+    with pytest.raises(UserError, match="--set: parameter 'JF' is -1"):
+        load_fibre("18Dec2017a", model, values={"JF": -1.0})

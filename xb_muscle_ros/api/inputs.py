@@ -44,21 +44,27 @@ def fibre_of(
     Raises:
         UserError: see `picked` and `changed`.
     """
-    found = changed(picked(fibre, model, method, for_fit), dict(values or {}), "--set")
+    found = changed(picked(fibre, model, method, for_fit, values), dict(values or {}), "--set")
     lines.say(borrowed_line(found))
     if not for_fit:  # a fit says these of the values that it ends with
         lines.say(without_effect_line(found.model, found.values), wide_bins_line(found.values))
     return found
 
 
-def picked(fibre: FibreLike, model: str | None, method: str | None, for_fit: bool = False) -> Fibre:
-    """A fibre in memory as it is, or that of a file.
+def picked(
+    fibre: FibreLike,
+    model: str | None,
+    method: str | None,
+    for_fit: bool = False,
+    values: Mapping[str, float] | None = None,
+) -> Fibre:
+    """A fibre in memory as it is, or that of a file; `values` where the file lacks parameters.
 
     Raises:
         UserError: see `load_fibre`; a fibre in memory is of another model or method.
     """
     if not isinstance(fibre, Fibre):
-        return load_fibre(fibre, model, method, for_fit)
+        return load_fibre(fibre, model, method, for_fit, values)
     for what, wanted in (("model", model), ("method", method)):
         if wanted not in (None, getattr(fibre, what)):
             raise UserError(

@@ -49,6 +49,8 @@ class Setting:
         priority: ``realtime_priority`` of the node; 0: ordinary.
         fibres: of a node of many.
         ticks: of the soak.
+        empirical: table of measured SRS, for the study of peers.
+        peers_python: Python with OpenSim; None: where ``scripts/setup_peers`` makes it.
     """
 
     fibre: Fibre
@@ -58,6 +60,8 @@ class Setting:
     priority: int = 0
     fibres: int = 100
     ticks: int = 10_000_000
+    empirical: Path | None = None
+    peers_python: Path | None = None
 
     def drawing(self, name: str) -> Path:
         """Where a study draws its figure."""

@@ -36,6 +36,7 @@ STUDIES = {
     "batch": Study("one tick of 100 fibres, memory of 1,000", "batch_time"),
     "start": Study("a process from nothing to its first step", "start_time"),
     "cost": Study("cost against accuracy of all solution methods", "cost", draws="cost"),
+    "peers": Study("muscles of OpenSim and MuJoCo beside ours: cost, and SRS", "peer_study", draws="peers"),
     "fast": Study("fast stretches with and without forcible detachment", "fast_stretch", draws="fast_stretch"),
     "fit": Study("fits by least squares and by collocation", "fit_time"),
     "node": Study("lateness of a realtime node, beside a plain timer", "node_timing", "realtime"),
@@ -57,7 +58,7 @@ def run(names: Sequence[str], setting: Setting, overwrite: bool) -> list[Figure]
 
     older = matching(setting.out.parent, re.escape(setting.out.name))
     drawn = [study.draws for name, study in STUDIES.items() if study.draws and (older or name in names)]
-    older += matching(setting.out.parent, *(rf"{name}\.(png|pdf)" for name in drawn))
+    older += matching(setting.out.parent, *(rf"{name}\.(png|pdf|md|json)" for name in drawn))
     refuse_older(older, overwrite)
     remove_results(older)
     made: list[Figure] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from xb_muscle_ros.bench.studies import STUDIES
 from xb_muscle_ros.cli import common
@@ -20,6 +21,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="what to measure, see below (default rhs trial)",
     )  # fmt: skip
     common.add_out(parser, "file for the figures", "bench.json", metavar="FILE")
+    peers = parser.add_argument_group("peers")
+    peers.add_argument("--empirical", type=Path, metavar="FILE", help="measured SRS, as for evaluate --paper")
+    peers.add_argument(
+        "--peers-python", type=Path, metavar="FILE",
+        help="Python with OpenSim (default: XB_MUSCLE_PEERS_PYTHON, else that of scripts/setup_peers)",
+    )  # fmt: skip
     node = parser.add_argument_group("studies of a running node and the soak")
     node.add_argument(
         "--duration", type=float, default=60.0, metavar="S", help="of node, roundtrip and many, s (default 60)"
@@ -40,7 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.bench import measure, studies
 
     of_node = (arguments.duration, arguments.rate, arguments.priority, arguments.fibers)
-    setting = measure.Setting(common.fibre_of(arguments), arguments.out, *of_node, arguments.ticks)
+    of_peers = (arguments.empirical, arguments.peers_python)
+    setting = measure.Setting(common.fibre_of(arguments), arguments.out, *of_node, arguments.ticks, *of_peers)
     made = studies.run(arguments.study, setting, arguments.overwrite)
     print(measure.as_text(made))
     measure.write(arguments.out, made)

@@ -76,7 +76,11 @@ def find_fibre_file(name_or_path: str | Path) -> Path:
 
 
 def load_fibre(
-    name_or_path: str | Path, model: str | None = None, method: str | None = None, for_fit: bool = False
+    name_or_path: str | Path,
+    model: str | None = None,
+    method: str | None = None,
+    for_fit: bool = False,
+    values: Mapping[str, object] | None = None,
 ) -> Fibre:
     """Read a fibre file.
 
@@ -85,6 +89,7 @@ def load_fibre(
         model: parameter set to pick; the file's default where None.
         method: representation to use; the file's where None.
         for_fit: see `fibre_from_parameters`.
+        values: see `fibre_from_parameters`.
 
     Returns:
         the fibre: values in the units of ``xb_muscle parameters``, L0 in m, F0 in N.
@@ -116,7 +121,7 @@ def load_fibre(
             f"fibre file {path} has no '/**: ros__parameters:' at its top; see config/fibers for files that have"
         )
     flat = dict(_flatten(inner, ""))
-    fibre = fibre_from_parameters(flat, f"fibre file {path}", model, method, for_fit)
+    fibre = fibre_from_parameters(flat, f"fibre file {path}", model, method, for_fit, values)
     return replace(fibre, path=path)
 
 
@@ -169,6 +174,7 @@ def fibre_from_parameters(
     model: str | None = None,
     method: str | None = None,
     for_fit: bool = False,
+    values: Mapping[str, object] | None = None,
 ) -> Fibre:
     """Build a fibre from flat ROS parameter names such as ``models.3state_coop.f``.
 
@@ -178,6 +184,8 @@ def fibre_from_parameters(
         model: set to pick; the parameter ``model`` where None.
         method: see `load_fibre`.
         for_fit: take parameters of swapped blocks that no set gives from the catalogue of mechanisms, as a start.
+        values: in place of those of the source, or where it lacks them; names that the model does not have are left to
+            `changed`.
 
     Raises:
         UserError: see `load_fibre`.
@@ -214,6 +222,9 @@ def fibre_from_parameters(
     if how not in METHODS:
         raise UserError(f"{where}: method '{how}' is not known{suggest(how, METHODS)}")
     given = _own_and_base(chosen, sets, where)
+    needed = {row.name for row in compose(chosen, how).parameters}
+    further = {n: checked(n, value, PARAMETERS, "--set") for n, value in (values or {}).items() if n in needed}
+    given = {**given, **further}
     starts = _swapped_starts(chosen, sets, given) if for_fit else {}
     given = {**given, **{name: values[0] for name, values in starts.items()}}
     values = complete(given, model_of_set(chosen), f"{where}, model {chosen}", how)

@@ -77,7 +77,8 @@ def complete(values: Mapping[str, float], model: str, where: str, method: str = 
             full[name] = values[name]
         elif row.default is None:
             raise UserError(
-                f"{where}: model {model} needs parameter '{name}' ({row.meaning}, {row.unit}); add it to the set"
+                f"{where}: model {model} needs parameter '{name}' ({row.meaning}, {row.unit}); add it to the set, or "
+                "to --set where a command has it"
             )
         else:
             full[name] = row.default

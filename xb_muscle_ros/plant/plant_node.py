@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import functools
+import gc
 from collections.abc import Callable
 from typing import Any
 
@@ -39,6 +40,9 @@ def _play(arguments: list[str], stop: program.Stop) -> None:
     given = read(node)
     body = _BODIES.get(given["scene"], _one_joint)(given)
     plant = Episodes(node, body, given, stop)
+    # What is there now stays; the collector need not look at it again, in the middle of a tick.
+    gc.collect()
+    gc.freeze()
     try:
         plant.run()
     finally:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.evaluate.figures.look import MEASURED, look, shade
+from xb_muscle_ros.evaluate.figures.profile import Profile
 from xb_muscle_ros.evaluate.sections import SrsSection
-from xb_muscle_ros.evaluate.srs_scores import READINGS
-from xb_muscle_ros.evaluate.srs_table import SrsTable, place
+from xb_muscle_ros.evaluate.srs_table import SrsTable
 from xb_muscle_ros.models.titles import title_of
 from xb_muscle_ros.plotting.style import figure, save
 from xb_muscle_ros.scores.conditions import (
@@ -25,47 +25,12 @@ from xb_muscle_ros.scores.conditions import (
     SETS,
     activation_class,
 )
-from xb_muscle_ros.scores.relative import nanmean, nansd
 from xb_muscle_ros.trials.trial import Array
 
-_READING = READINGS["released"]
 _TOP = 1.75
 _ALONG = ("activation", "amplitude", "recovery")
 # Where a reading's bar stands beside a model's place.
 _SIDES = {"text": -0.2, "released": 0.2}
-
-
-class _Profile:
-    """Relative SRS along one axis and its standard errors, NaN where not known: shape (fibres, points), as x."""
-
-    def __init__(self, table: SrsTable, along: str) -> None:
-        pooled = table.pooled(_READING.unconditioned)
-        each = np.array([p.test / np.where(p.unconditioned == 0.0, np.nan, p.unconditioned) for p in pooled.values()])
-        error = np.array([p.se for p in pooled.values()])
-        j, k = place(table.recovery_s, COMMON_RECOVERY_S), place(table.amplitude_l0, COMMON_AMPLITUDE_L0)
-        level = CLASSES.index(COMMON_CLASS)
-        empty = np.empty((each.shape[0], 0))
-        if along == "activation":
-            self.y, self.se = (empty if j is None or k is None else of[:, :, j, k] for of in (each, error))
-            self.x = np.array([_class_force(table, name) for name in table.fibres])[:, : self.y.shape[1]]
-        elif along == "amplitude":
-            moved = table.amplitude_l0 > 0.0
-            self.y, self.se = (
-                empty if j is None or not moved.any() else of[:, level, j, moved] for of in (each, error)
-            )
-            self.x = 100.0 * table.amplitude_l0[moved]
-        else:
-            self.y, self.se = (empty if k is None else of[:, level, :, k] for of in (each, error))
-            self.x = table.recovery_s
-        if self.x.ndim == 1:
-            self.x = np.broadcast_to(self.x[: self.y.shape[1]], self.y.shape)
-
-    def means(self) -> tuple[Array, Array, Array]:
-        """x, y and s.d. of y over fibres at the points that were tested."""
-        y, sd = nanmean(self.y), nansd(self.y)
-        some = np.isfinite(y)
-        x = nanmean(np.where(np.isfinite(self.y), self.x, np.nan))
-        return x[some], y[some], sd[some]
 
 
 NOTHING_TO_DRAW = (
@@ -76,7 +41,7 @@ NOTHING_TO_DRAW = (
 
 def drawable(data: SrsTable, tables: Mapping[str, SrsTable], section: SrsSection) -> bool:
     """Whether there is anything to draw; see `draw_srs`."""
-    profiles = (_Profile(table, along) for table in (data, *tables.values()) for along in _ALONG)
+    profiles = (Profile(table, along) for table in (data, *tables.values()) for along in _ALONG)
     scores = (of.under[reading].rmsd[which] for of in section.models.values() for reading in _SIDES for which in SETS)
     return any(profile.means()[0].size for profile in profiles) or any(score is not None for score in scores)
 
@@ -134,7 +99,7 @@ def _readings_text(section: SrsSection) -> str:
 
 def _profile(axis: Any, along: str, data: SrsTable, tables: Mapping[str, SrsTable]) -> None:
     axis.axhline(1.0, color="black", linewidth=0.6, linestyle=(0, (1, 2)))
-    measured = _Profile(data, along)
+    measured = Profile(data, along)
     shown = np.where(np.abs(measured.y) < 10.0, measured.y, np.nan)
     axis.errorbar(
         measured.x.ravel(), shown.ravel(), np.where(np.isfinite(measured.se), measured.se, 0.0).ravel(), fmt=".",
@@ -152,7 +117,7 @@ def _profile(axis: Any, along: str, data: SrsTable, tables: Mapping[str, SrsTabl
         )  # fmt: skip
     for name, table in tables.items():
         way = look(name)
-        x, y, _ = _Profile(table, along).means()
+        x, y, _ = Profile(table, along).means()
         every.append(x)
         order = np.argsort(x)
         axis.plot(
@@ -186,12 +151,6 @@ def _large(along: str, x: Array) -> Any:
     if along == "recovery":
         return x < LARGE_BELOW_S
     return np.isin(activation_class(x), [CLASSES.index("low"), CLASSES.index("intermediate")])
-
-
-def _class_force(table: SrsTable, fibre: str) -> Array:
-    """Mean isometric force of a fibre in each class, F0, shape (classes,)."""
-    force, classes = table.isometric_f0(fibre), table.classes(fibre)
-    return np.array([nanmean(force[classes == level][:, None])[0] for level in range(len(CLASSES))])
 
 
 def _bars(axis: Any, which: str, section: SrsSection) -> None:
