@@ -18,7 +18,7 @@ MUSCLES = {"ankle": ["soleus", "tibialis_anterior"], "knee": ["vasti"]}
 
 OF_BOTH = {"fiber_file": str, "model": str, "mode": str}
 OF_THE_MUSCLES = {"autostart": bool, "state_file": str, "load_state_at_start": bool}
-OF_THE_BODY = {"scene": str, "elastic_tendon": bool, "duration_s": float, "episodes": int}
+OF_THE_BODY = {"scene": str, "elastic_tendon": bool, "duration_s": float, "episodes": int, "give_up_s": float}
 
 
 def generate_launch_description() -> LaunchDescription:
@@ -36,6 +36,7 @@ def generate_launch_description() -> LaunchDescription:
         argument("elastic_tendon", "false", "tendons stretch"),
         argument("duration_s", "1.0", "length of an episode in s"),
         argument("episodes", "0", "how many; 0: until stopped"),
+        argument("give_up_s", "0.0", "longest wait of the body for its muscles in s; 0: without end"),
         argument("state_file", "", "file of the muscles' ~/save_state and ~/load_state"),
         argument("load_state_at_start", "false", "the muscles go on with the states in state_file"),
         argument("namespace", "", "namespace of both nodes and their topics"),

@@ -9,6 +9,7 @@ import pytest
 
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.plant.loop import run_ankle, run_knee
+from xb_muscle_ros.plant.reflex import Reflex
 from xb_muscle_ros.plant.translation import RampAndHold
 
 pytest.importorskip("mujoco", reason="needs the extra mujoco")
@@ -82,3 +83,28 @@ def test_wrong_nodes_are_named(nodes: int) -> None:
         run_ankle(load_fibre("18Dec2017a", "hill_se"), RampAndHold(), 0.05, muscles=over_ros(nodes, "/ankle"))
     with pytest.raises(UserError, match="has no fibre 'soleus'"):
         run_ankle(load_fibre("18Dec2017a", MODEL), RampAndHold(), 0.05, muscles=over_ros(nodes, "/knee"))
+
+
+@pytest.mark.slow
+def test_reflex_over_dds(nodes: int) -> None:
+    """Calcium is sent as far ahead as the reflex is delayed, so that no step waits for it; elastic tendons as well."""
+    from xb_muscle_ros.plant.live import over_ros
+
+    fibre, reflex = load_fibre("18Dec2017a", MODEL), Reflex(4.0, 0.2, 0.5)
+    for elastic, nearness in ((False, 1e-6), (True, 0.5)):
+        live = run_ankle(fibre, RampAndHold(), 0.25, elastic, over_ros(nodes, "/ankle"), reflex)
+        inside = run_ankle(fibre, RampAndHold(), 0.25, elastic, reflex=reflex)
+        assert live.level[-1, 0] > live.level[0, 0]
+        assert np.max(np.abs(live.force_n - inside.force_n)) < nearness
+
+
+def test_a_body_that_falls_ends_the_run_with_what_went_before(nodes: int) -> None:
+    """The node would refuse the next length; nobody waits for its answer."""
+    from xb_muscle_ros.plant.live import over_ros
+
+    live = run_ankle(
+        load_fibre("18Dec2017a", MODEL), RampAndHold(-0.9, 3.0, 30.0), 0.6, muscles=over_ros(nodes, "/ankle")
+    )
+    assert 0.05 < live.time_s[-1] < 0.55
+    assert "beyond 0.5 to 1.5 L0, which the node refuses" in live.ended
+    assert np.all(np.abs(live.length_change_l0) <= 0.5)

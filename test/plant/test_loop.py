@@ -10,6 +10,7 @@ from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
 from xb_muscle_ros.plant.drives import FibreDrive, without_parallel
 from xb_muscle_ros.plant.loop import Trace, run_ankle, run_knee
 from xb_muscle_ros.plant.plant import Plant
+from xb_muscle_ros.plant.reflex import Reflex
 from xb_muscle_ros.plant.report import numbers
 from xb_muscle_ros.plant.tendon import tendon_at
 from xb_muscle_ros.plant.translation import RampAndHold
@@ -166,3 +167,56 @@ def test_knee_muscle_has_no_parallel_element() -> None:
     fibre = without_parallel(load_fibre("18Dec2017a", "3state_coop"))
     assert fibre.values["kpe"] == 0.0
     assert fibre.values["Fpe0"] == 0.0
+
+
+@pytest.mark.parametrize("model", ["3state_coop", None])
+def test_a_reflex_acts_after_its_delay_and_not_a_tick_earlier(model: str | None) -> None:
+    """Lengths begin to change at the second sample; calcium then differs `delay` later, force one tick after that."""
+    fibre, delay = fibre_of(model), 30
+    traces = [run_ankle(fibre, RampAndHold(), 0.3, reflex=reflex) for reflex in (Reflex(), Reflex(2.0, delay_s=0.03))]
+    without, having = traces
+    first = int(np.flatnonzero(np.any(without.length_change_l0 > without.length_change_l0[0], axis=1))[0])
+    assert first == 1
+    assert np.flatnonzero(np.any(having.level != without.level, axis=1))[0] == first + delay
+    assert np.flatnonzero(np.any(having.force_n != without.force_n, axis=1))[0] == first + delay + 1
+    assert np.all(without.level == without.level[0])
+    # It holds the body up.
+    assert having.angle_rad[-1] < without.angle_rad[-1] - 1e-4
+    assert having.level[-1, 0] > having.level[0, 0]
+
+
+@pytest.mark.parametrize("elastic", [False, True])
+def test_a_reflex_with_gains_of_nothing_changes_no_bit(elastic: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even where its whole way is gone: delay, activation stage, table of calcium."""
+    fibre = fibre_of("3state_coop")
+    plain = run_ankle(fibre, RampAndHold(), 0.1, elastic)
+    monkeypatch.setattr(Reflex, "works", True)
+    idle = run_ankle(fibre, RampAndHold(), 0.1, elastic, reflex=Reflex())
+    assert idle.reflex
+    assert idle.force_n.tobytes() == plain.force_n.tobytes()
+    assert idle.level.tobytes() == plain.level.tobytes()
+
+
+def test_a_reflex_repeats_to_the_last_bit() -> None:
+    reflex = Reflex(2.0, 0.1, 0.5)
+    one, two = (run_ankle(fibre_of("3state_coop"), RampAndHold(), 0.2, reflex=reflex) for _ in range(2))
+    assert one.force_n.tobytes() == two.force_n.tobytes()
+    assert one.level.tobytes() == two.level.tobytes()
+
+
+def test_a_run_that_leaves_its_muscles_behind_keeps_what_went_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows up to the last that a muscle answered; why it ended is told."""
+    whole = run_ankle(fibre_of("3state_coop"), RampAndHold(), 0.1)
+    at = 0.05
+    real = Plant.length_change_l0
+
+    def torn(plant: Plant) -> np.ndarray:
+        return np.array([-1.01, 0.0]) if plant.time_s >= at - 1e-9 else real(plant)
+
+    monkeypatch.setattr(Plant, "length_change_l0", torn)
+    ended = run_ankle(fibre_of("3state_coop"), RampAndHold(), 0.1)
+    assert ended.time_s.size == 50
+    assert ended.force_n.tobytes() == whole.force_n[:50].tobytes()
+    assert "soleus at t = 0.050 s" in ended.ended
+    assert ended.remark.startswith("3state_coop: 3state_coop, soleus")
+    assert not whole.ended

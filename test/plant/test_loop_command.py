@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import sys
 from pathlib import Path
@@ -64,6 +65,10 @@ def test_knee_is_run_with_and_without_movement(tmp_path: Path, monkeypatch: pyte
         (["--live"], "give one --model"),
         (["--live", "--model", "mujoco"], "give one --model"),
         (["--scene", "knee", "--speed", "1"], "are of the scenes ankle and myolegs; drop them"),
+        (["--reflex-delay-s", "0.1"], "the reflex has no gain above 0"),
+        (["--reflex-length-per-l0", "-1"], "length_per_l0 is -1; allowed is 0 to 1000"),
+        (["--reflex-force-per-f0", "1", "--reflex-muscle", "soleuss"], "called 'soleuss'; did you mean 'soleus'?"),
+        (["--reflex-force-per-f0", "1", "--reflex-delay-s", "0.0123"], "allowed are whole ticks of 0.001 s"),
     ],
 )
 def test_wrong_options(arguments: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -99,5 +104,55 @@ def test_a_fibre_beyond_its_lengths_is_told_once_with_the_time(
     column = text[0].split(",").index("soleus.length_change_l0")
     first = next(row.split(",") for row in text[1:] if float(row.split(",")[column]) > 0.5)
     assert f"from t = {float(first[1]):.3f} s on" in said
+    run = json.loads((tmp_path / "loop.json").read_text())["runs"][0]
+    assert run["beyond_lengths"] in said
+    assert run["ended_before_its_time"] is None
     assert main(["loop", "--model", "mujoco", "--duration", "0.1", "--out", str(tmp_path / "short")]) == 0
     assert "beyond" not in capsys.readouterr().err
+    assert json.loads((tmp_path / "short" / "loop.json").read_text())["runs"][0]["beyond_lengths"] is None
+
+
+def test_a_run_that_ends_before_its_time_has_files_a_line_and_code_2(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from xb_muscle_ros.plant.drives import FibreDrive, RunEnded
+
+    draw_nothing(monkeypatch)
+    pull = FibreDrive.pull
+
+    def torn(drive: FibreDrive) -> object:
+        if drive._plant.time_s > 0.0505:
+            raise RunEnded("the body is gone")
+        return pull(drive)
+
+    monkeypatch.setattr(FibreDrive, "pull", torn)
+    assert main(["loop", "--model", "3state_coop", "--duration", "0.1", "--out", str(tmp_path)]) == 2
+    said = capsys.readouterr()
+    assert said.err.count("3state_coop: the body is gone") == 1
+    run = json.loads((tmp_path / "loop.json").read_text())["runs"][0]
+    assert run["ended_before_its_time"] == "the body is gone"
+    assert run["numbers"]["stiffness_50ms_mgh"] is not None
+    assert run["numbers"]["stiffness_100ms_mgh"] is None
+    assert len((tmp_path / "loop.csv").read_text().splitlines()) == 1 + 51
+
+
+def test_a_reflex_is_run_beside_its_absence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The absence is what a run without the option gives; calcium and activation of every tick are in the table."""
+    draw_nothing(monkeypatch)
+    arguments = ["loop", "--model", "3state_coop", "--model", "mujoco", "--duration", "0.15"]
+    reflex = ["--reflex-length-per-l0", "2", "--reflex-delay-s", "0.03", "--reflex-muscle", "soleus"]
+    assert main([*arguments, *reflex, "--out", str(tmp_path / "with")]) == 0
+    assert main([*arguments, "--out", str(tmp_path / "without")]) == 0
+    having, plain = (json.loads((tmp_path / name / "loop.json").read_text()) for name in ("with", "without"))
+    assert having["reflex"]["delay_s"] == 0.03
+    assert having["reflex"]["muscles"] == ["soleus"]
+    assert [run["reflex"] for run in having["runs"]] == [False, True, False, True]
+    assert [run for run in having["runs"] if not run["reflex"]] == plain["runs"]
+    with (tmp_path / "with" / "loop.csv").open(newline="") as file:
+        rows = list(csv.reader(file))
+    calcium, activation = (rows[0].index(f"soleus.{kind}") for kind in ("calcium_um", "activation"))
+    last = {row[0]: row for row in rows[1:]}
+    assert float(last["3state_coop, reflex"][calcium]) > float(last["3state_coop"][calcium])
+    assert last["3state_coop"][activation] == ""
+    assert float(last["mujoco, reflex"][activation]) > float(last["mujoco"][activation])
+    assert "calcium" not in (tmp_path / "without" / "loop.csv").read_text().splitlines()[0]

@@ -76,6 +76,31 @@ class Stage:
         target = len(self.joints[space]) + ticks
         self.until(lambda: len(self.joints[space]) >= target)
 
+    def until_ended(self, name: str) -> int:
+        """Exit code of a process, which ends by itself; meanwhile the audience listens."""
+        process = self.processes[name].process
+        self.until(lambda: process.poll() is not None)
+        self.link.wait_for(lambda: False, 0.3)
+        return int(process.poll())
+
+    def episode_statuses(self, node: str) -> list[Any]:
+        """What a body says of its episodes in /diagnostics from now on."""
+        from diagnostic_msgs.msg import DiagnosticArray
+
+        heard: list[Any] = []
+        name = f"{node.lstrip('/')}: episode"
+
+        def hear(message: Any) -> None:
+            heard.extend(status for status in message.status if status.name == name)
+
+        self.link.node.create_subscription(DiagnosticArray, "/diagnostics", hear, 100)
+        return heard
+
+    def peer(self, space: str) -> Any:
+        """The link, as a client of a namespace's muscle node."""
+        self.link.peer = f"{space}/muscle_node"
+        return self.link
+
     def log(self, name: str) -> str:
         """Of a process."""
         return str(self.processes[name].log())
@@ -89,6 +114,15 @@ def stage(new_domain: Callable[[], int]) -> Iterator[Stage]:
     for process in made.processes.values():
         process.stop()
     made.link.close()
+
+
+THROWN = {"displacement_m": -0.9, "speed_m_per_s": 3.0, "acceleration_m_per_s2": 30.0, "duration_s": 5.0}
+"""A push after which no fibre can follow the body."""
+
+
+def last_episode(heard: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """From the last time 0 on."""
+    return heard[max(k for k, (time_s, _) in enumerate(heard) if time_s == 0.0) :]
 
 
 def episodes(heard: list[tuple[float, float]]) -> list[list[tuple[float, float]]]:
@@ -173,10 +207,23 @@ def test_arguments_that_are_not_of_ros_are_refused() -> None:
 def test_a_body_that_falls_ends_its_episode_with_reason_code_and_last_state(stage: Stage, mode: str) -> None:
     """No fibre can follow it any further; the node that would refuse its lengths is not asked for ever."""
     stage.muscle("/e", mode)
-    stage.plant("/e", mode, displacement_m=-0.9, speed_m_per_s=3.0, acceleration_m_per_s2=30.0, duration_s=5.0)
-    assert stage.processes["plant/e"].wait(60.0) == 2
+    heard = stage.episode_statuses("/e/plant_node")
+    stage.plant("/e", mode, episodes=2, **THROWN)
+    assert stage.until_ended("plant/e") == 2
     log = stage.log("plant/e")
+    # The next one begins all the same; the exit tells of both.
     assert "episode 1 ended before its time: the fibre of" in log
+    assert "plant_node: 2 of 2 episodes ended before their time; the last: episode 2 ended" in log
+    # The first may have come before the audience was known.
+    errors = [status for status in heard if status.level == b"\x02"]
+    assert [value.value for value in errors[-1].values][:2] == ["2", "2"]
+    assert all("beyond 0.5 to 1.5 L0" in status.message for status in errors)
+    playing = [status for status in heard if status.message == "playing" and status.values[0].value == "2"]
+    assert playing[0].level == b"\x00"
+    assert "episode 1 ended before its time" in playing[0].values[2].value
+    if mode == "lockstep":
+        first, second = (e for e in [*episodes(stage.joints["/e"]), last_episode(stage.joints["/e"])])
+        assert first == second
     assert "beyond 0.5 to 1.5 L0" in log
     assert "last state: t = " in log
     assert "does not answer" not in log
@@ -195,7 +242,7 @@ def test_a_muscle_node_that_takes_no_more_lengths_ends_the_episode(stage: Stage)
 
         sender = link.node.create_publisher(JointState, "muscle/length", 10)
         assert link.wait_for(lambda: sender.get_subscription_count() > 0, PATIENCE_S)
-        stage.plant("/f", "lockstep", displacement_m=-0.001)
+        stage.plant("/f", "lockstep", displacement_m=-0.001, episodes=1)
         stage.moves_on("/f", 50)
         message = JointState(name=["soleus", "tibialis_anterior"], position=[0.05, 0.1])
         message.header.stamp.sec = 3000
@@ -204,3 +251,82 @@ def test_a_muscle_node_that_takes_no_more_lengths_ends_the_episode(stage: Stage)
     log = stage.log("plant/f")
     assert "takes no more lengths" in log
     assert "stamp not after the last" in log
+
+
+@pytest.mark.slow
+def test_a_body_that_falls_again_and_again_goes_on_until_stopped(stage: Stage) -> None:
+    """`episodes` of 0 knows no last one; told to stop, it says how many ended early."""
+    stage.muscle("/g", "lockstep")
+    stage.plant("/g", "lockstep", **THROWN)
+    stage.until(lambda: "episode 2 ended before its time" in stage.log("plant/g"))
+    assert stage.processes["plant/g"].stop() == 0
+    assert "episodes ended before their time; the last" in stage.log("plant/g")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["lockstep", "realtime"])
+def test_a_muscle_node_that_is_put_to_sleep_is_waited_for_by_name_and_not_for_ever(stage: Stage, mode: str) -> None:
+    """Deactivated, it is on the graph and answers nothing: the log says how to wake it, `give_up_s` ends the wait."""
+    from lifecycle_msgs.msg import Transition
+    from lifecycle_msgs.srv import ChangeState
+
+    def change(transition: int) -> None:
+        request = ChangeState.Request()
+        request.transition.id = transition
+        assert stage.peer("/h").call(ChangeState, "change_state", request).success
+
+    stage.muscle("/h", mode)
+    heard = stage.episode_statuses("/h/plant_node")
+    stage.plant("/h", mode, displacement_m=-0.001, duration_s=0.5, give_up_s=4.0)
+    stage.moves_on("/h")
+    change(Transition.TRANSITION_DEACTIVATE)
+    stage.until(lambda: "muscle_node is inactive; activate it" in stage.log("plant/h"))
+    stage.until(lambda: any(s.level == b"\x01" and "is inactive" in s.message for s in heard))
+    change(Transition.TRANSITION_ACTIVATE)
+    stage.until(lambda: "going on with node" in stage.log("plant/h"))
+    stage.moves_on("/h")
+    change(Transition.TRANSITION_DEACTIVATE)
+    assert stage.until_ended("plant/h") == 2
+    assert "gave up after" in stage.log("plant/h")
+    assert "give_up_s is 4" in stage.log("plant/h")
+    assert heard[-1].level == b"\x02"
+
+
+@pytest.mark.slow
+def test_realtime_mends_constants_that_somebody_changed(stage: Stage) -> None:
+    """With another reference length the node refuses all lengths; the body gives it the right one and goes on."""
+    stage.muscle("/i", "realtime")
+    stage.plant("/i", "realtime", displacement_m=-0.001, duration_s=0.5)
+    stage.moves_on("/i")
+    stage.peer("/i").set_parameters({"soleus.constants.reference_length_m": 5.0})
+    stage.link.reset()
+    stage.until(lambda: "the body waits for it" in stage.log("plant/i"))
+    count = stage.log("plant/i").count("episode of 500 ticks")
+    stage.until(lambda: stage.log("plant/i").count("episode of 500 ticks") > count + 1)
+    assert "Traceback" not in stage.log("plant/i")
+
+
+@pytest.mark.slow
+def test_reflex_in_lockstep_is_that_of_the_run_in_process(stage: Stage) -> None:
+    """Calcium travels as far ahead as the reflex is delayed, and so is always there in time."""
+    import numpy as np
+
+    from xb_muscle_ros.models.fibre_file import load_fibre
+    from xb_muscle_ros.plant.loop import run_ankle
+    from xb_muscle_ros.plant.reflex import Reflex
+    from xb_muscle_ros.plant.translation import RampAndHold
+
+    stage.muscle("/j", "lockstep")
+    stage.plant(
+        "/j", "lockstep", duration_s=0.4, episodes=2, reflex_length_per_l0=4.0, reflex_velocity_s_per_l0=0.2,
+        reflex_muscles="[soleus]",
+    )  # fmt: skip
+    assert stage.until_ended("plant/j") == 0
+    assert "not exactly those of the reflex" not in stage.log("plant/j")
+    played = [*episodes(stage.joints["/j"]), last_episode(stage.joints["/j"])]
+    assert played[0] == played[1]
+    fibre, reflex = load_fibre("18Dec2017a"), Reflex(4.0, 0.2, muscles=("soleus",))
+    inside, without = (run_ankle(fibre, RampAndHold(), 0.4, reflex=each) for each in (reflex, Reflex()))
+    angle = np.array([angle for _, angle in played[0]])
+    assert np.max(np.abs(angle - inside.angle_rad[: angle.size])) < 1e-10
+    assert without.angle_rad[-1] - inside.angle_rad[-1] > 1e-3

@@ -7,7 +7,7 @@ import functools
 import itertools
 from collections.abc import Callable
 
-from xb_muscle_ros.cli import common, loop_leg
+from xb_muscle_ros.cli import common, loop_leg, loop_reflex
 from xb_muscle_ros.cli.loop_models import fibres_of, platform_values
 from xb_muscle_ros.errors import UserError
 
@@ -46,6 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ankle.add_argument("--speed", type=float, metavar="M_PER_S", help="speed, m/s (default 0.2)")
     ankle.add_argument("--acceleration", type=float, metavar="M_PER_S2", help="acceleration, m/s² (default 2)")
     loop_leg.add_arguments(parser)
+    loop_reflex.add_arguments(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -59,6 +60,7 @@ def _run_joint(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.plant.figure import draw_loop
     from xb_muscle_ros.plant.loop import DURATION_S, Muscles, in_process, run_ankle, run_knee
     from xb_muscle_ros.plant.plant import Plant
+    from xb_muscle_ros.plant.reflex import NO_REFLEX
     from xb_muscle_ros.plant.report import table, write
     from xb_muscle_ros.plant.translation import RampAndHold
     from xb_muscle_ros.progress import Progress
@@ -76,11 +78,17 @@ def _run_joint(arguments: argparse.Namespace) -> int:
         raise UserError("--displacement, --speed and --acceleration are of the scenes ankle and myolegs; drop them")
     loop_leg.refuse(arguments)
     platform = RampAndHold(**given)
+    reflex = loop_reflex.reflex_of(arguments)
     # Before any model is compiled: is there an engine at all?
     plant = Plant(scene)
     settings: dict[str, object] = {"mujoco": plant.version, "tick_s": plant.tick_s, "duration_s": duration}
     settings["live"] = arguments.live
     settings["tendon"] = "elastic" if elastic else "rigid"
+    reflexes = [NO_REFLEX]
+    if reflex.works:
+        # Each model without it and with it: what it does is the difference.
+        settings["reflex"] = vars(reflex)
+        reflexes.append(reflex)
     fibres = fibres_of(arguments.fiber, arguments.models, _MODELS)
     muscles: Muscles = in_process
     if arguments.live:
@@ -90,15 +98,20 @@ def _run_joint(arguments: argparse.Namespace) -> int:
         muscles = over_ros()
     if scene == "ankle":
         settings["platform"] = vars(platform)
-        runs = [functools.partial(run_ankle, fibre, platform, duration, elastic, muscles) for fibre in fibres]
+        runs = [
+            functools.partial(run_ankle, fibre, platform, duration, elastic, muscles, each)
+            for fibre, each in itertools.product(fibres, reflexes)
+        ]
         way = "backwards" if platform.displacement_m < 0.0 else "forwards"
         title = (
             f"Platform moves {100 * abs(platform.displacement_m):g} cm {way}, {platform.speed_m_per_s:g} m/s, "
             f"{platform.acceleration_m_per_s2:g} m/s²"
         )
     else:
-        both = itertools.product((False, True), fibres)
-        runs = [functools.partial(run_knee, fibre, moved, duration, elastic, muscles) for moved, fibre in both]
+        runs = [
+            functools.partial(run_knee, fibre, moved, duration, elastic, muscles, each)
+            for moved, fibre, each in itertools.product((False, True), fibres, reflexes)
+        ]
         title = "Leg released from level"
     traces = []
     with Progress(len(runs), "loop") as progress:
@@ -106,13 +119,14 @@ def _run_joint(arguments: argparse.Namespace) -> int:
             traces.append(run_one())
             progress.update()
     for trace in traces:
-        if said := trace.beyond:
+        if said := trace.remark:
             common.warn(said)
     print(table(traces))
-    draw_loop(arguments.out / "loop.png", traces, f"{title}; {settings['tendon']} tendons")
+    how = f"{title}; {settings['tendon']} tendons" + (f"; {reflex.words}" if reflex.works else "")
+    draw_loop(arguments.out / "loop.png", traces, how)
     for path in [*write(arguments.out, traces, settings), arguments.out / "loop.png"]:
         print(path)
-    return 0
+    return 2 if any(trace.ended for trace in traces) else 0
 
 
 _SCENES: dict[str, Callable[[argparse.Namespace], int]] = {

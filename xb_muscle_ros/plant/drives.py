@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import Protocol
@@ -13,7 +14,9 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre, changed
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.node.rules import LENGTH_CHANGE_L0
+from xb_muscle_ros.plant.activation import CalciumTable, ReflexActivation, reflex_calcium
 from xb_muscle_ros.plant.plant import Array, Plant
+from xb_muscle_ros.plant.reflex import NO_REFLEX, Reflex, ReflexArc, ReflexLoop
 from xb_muscle_ros.plant.tendon import tendon_at
 
 OWN = "mujoco"
@@ -22,8 +25,12 @@ RELAXED_PCA = 9.0
 _MOST_PCA, _LEAST_PCA = 4.0, 8.0
 
 
+class RunEnded(UserError):
+    """The body has moved further than its muscles reach: what went before stands, nothing comes after."""
+
+
 class Drive(Protocol):
-    """Muscles of one plant, constantly activated."""
+    """Muscles of one plant, constantly activated but for a reflex."""
 
     driven_by: dict[str, dict[str, float]]
     """What holds the start: of each muscle ``calcium_um``, µM, or ``activation``, 0 to 1."""
@@ -34,11 +41,16 @@ class Drive(Protocol):
     def fibre_length_l0(self) -> Array:
         """Changes of the fibres' lengths at this moment, shape (muscle,)."""
 
+    def level(self) -> Array:
+        """What drives the muscles in the coming tick, in the unit of `driven_by`, shape (muscle,)."""
+
 
 class FibreDrive:
     """The fibre model, once for each muscle; the first muscle's calcium holds the start, the others are relaxed."""
 
-    def __init__(self, plant: Plant, fibre: Fibre, torque_nm: float, elastic: bool = False) -> None:
+    def __init__(
+        self, plant: Plant, fibre: Fibre, torque_nm: float, elastic: bool = False, reflex: Reflex = NO_REFLEX
+    ) -> None:
         """Settle all muscles at the plant's start.
 
         Args:
@@ -46,9 +58,10 @@ class FibreDrive:
             fibre: in the scene of the knee without its parallel element, see `without_parallel`.
             torque_nm: that all muscles together put on the joint, N·m.
             elastic: tendons stretch.
+            reflex: changes calcium from then on.
 
         Raises:
-            UserError: no calcium gives this torque.
+            UserError: no calcium gives this torque, or the reflex does not fit the muscles or the tick.
         """
         self._plant = plant
         self._muscle = Muscle(fibre)
@@ -70,6 +83,32 @@ class FibreDrive:
         ]
         self._elastic = elastic
         self._at_start = True
+        self._lengths_at_start = lengths
+        self._reflex = self.reflex_loop(reflex)
+
+    def reflex_loop(self, reflex: Reflex) -> ReflexLoop | None:
+        """A reflex that acts on calcium (µM), from its start; None where it does nothing.
+
+        Raises:
+            UserError: it does not fit the muscles or the tick.
+        """
+        plant = self._plant
+        arc = ReflexArc(reflex, [m.name for m in plant.muscles], plant.tick_s)
+        if not reflex.works:
+            return None
+        start = np.array(list(self.calcium_um.values()))
+        tables = self._tables
+
+        def calcium_of(activation: Array) -> Array:
+            return np.array([t.calcium_um(a) for t, a in zip(tables, activation.tolist(), strict=True)])
+
+        activation = np.array([t.activation(c) for t, c in zip(tables, start.tolist(), strict=True)])
+        return ReflexLoop(arc, start, reflex_calcium(activation, start, calcium_of, plant.tick_s))
+
+    @functools.cached_property
+    def _tables(self) -> list[CalciumTable]:
+        """Of each muscle at its length at the start."""
+        return [CalciumTable(self._muscle, length) for length in self._lengths_at_start.tolist()]
 
     def _calcium_for(self, force_f0: float, length: float) -> float:
         """Calcium (µM) at which the settled fibre pulls with a force in F0."""
@@ -99,19 +138,25 @@ class FibreDrive:
                     self._states[i] = self._stepped(i, self._fibre_l0[i])
                 except UserError as error:
                     plant, model = self._plant, self._muscle.fibre.model
-                    raise UserError(
+                    raise RunEnded(
                         f"{model}, {plant.muscles[i].name} at t = {plant.time_s:.3f} s, "
                         f"angle {plant.angle_rad:.4f} rad: {error}; the body has moved further than its muscles reach: "
                         "take a shorter --duration or a smaller --displacement"
                     ) from error
         self._at_start = False
         force = np.array([self._muscle.outputs(state).force_f0 for state in self._states])
+        if self._reflex is not None:
+            self._calcium = self._reflex.observe(self.fibre_length_l0(), force).tolist()
         self._plant.apply(force)
         return self._plant.tendon_force_n(force)
 
     def fibre_length_l0(self) -> Array:
         """Length changes of the fibres, shape (muscle,); on rigid tendons those of the plant."""
         return np.array(self._fibre_l0)
+
+    def level(self) -> Array:
+        """Calcium of the coming tick, shape (muscle,), µM."""
+        return np.array(self._calcium)
 
     def _stepped(self, i: int, length: float) -> Array:
         return self._muscle.step(self._states[i], length, self._calcium[i], self._plant.tick_s)
@@ -144,11 +189,11 @@ class FibreDrive:
 class OwnDrive:
     """MuJoCo's muscle actuator with its default curves, at the same F0, L0 and pennation."""
 
-    def __init__(self, plant: Plant, torque_nm: float) -> None:
+    def __init__(self, plant: Plant, torque_nm: float, reflex: Reflex = NO_REFLEX) -> None:
         """Find the activation that holds the start; see `FibreDrive`.
 
         Raises:
-            UserError: no activation gives this torque.
+            UserError: no activation gives this torque, or the reflex does not fit the muscles or the tick.
         """
         self._plant = plant
         activation = np.zeros(len(plant.muscles))
@@ -166,14 +211,27 @@ class OwnDrive:
             )
         plant.activate(activation)
         self.driven_by = {"activation": {m.name: float(a) for m, a in zip(plant.muscles, activation, strict=True)}}
+        self._level = activation
+        arc = ReflexArc(reflex, [m.name for m in plant.muscles], plant.tick_s)
+        stage = ReflexActivation(activation, plant.tick_s)
+        self._reflex = ReflexLoop(arc, activation, stage) if reflex.works else None
 
     def pull(self) -> Array:
-        """Nothing to set: MuJoCo computes the force within its step, with the velocity of the moment."""
-        return self._plant.own_force_n()
+        """MuJoCo computes the force within its step, with the velocity of the moment; a reflex sets the activation."""
+        force = self._plant.own_force_n()
+        if self._reflex is not None:
+            whole = self._plant.tendon_force_n(np.ones_like(force))
+            self._level = self._reflex.observe(self.fibre_length_l0(), force / whole)
+            self._plant.activate(self._level)
+        return force
 
     def fibre_length_l0(self) -> Array:
         """MuJoCo's muscle has no tendon."""
         return self._plant.length_change_l0()
+
+    def level(self) -> Array:
+        """Activation of the coming tick, shape (muscle,), 0 to 1."""
+        return self._level
 
 
 def _first_force(plant: Plant, others_n: Sequence[float] | Array, torque_nm: float) -> float:
@@ -206,6 +264,8 @@ def beyond(muscles: Sequence[str], length_l0: Array) -> str:
         length_l0: length changes of their fibres, shape (muscle,).
     """
     least, most = LENGTH_CHANGE_L0
+    if np.all((length_l0 >= least) & (length_l0 <= most)):
+        return ""
     for name, change in zip(muscles, length_l0.tolist(), strict=True):
         if not least <= change <= most:
             return f"the fibre of {name} comes to {1.0 + change:.3f} L0, beyond {1.0 + least:g} to {1.0 + most:g} L0"

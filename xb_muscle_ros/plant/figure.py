@@ -20,7 +20,9 @@ LOOKS: tuple[dict[str, Any], ...] = (
     {"color": DATA, "linestyle": "-", "linewidth": 2.6, "zorder": 1.5},
     {"color": "black", "linestyle": (0, (1, 1.2)), "linewidth": 1.6},
 )
-_MOVED = {"marker": "o", "markersize": 3.0, "markerfacecolor": "white", "markeredgewidth": 0.7}
+_MARKED = {"markersize": 3.0, "markerfacecolor": "white", "markeredgewidth": 0.7}
+_MARKERS = {(True, False): "o", (False, True): "^", (True, True): "s"}
+"""By whether the leg was moved before, and whether there is a reflex."""
 
 
 def draw_loop(path: Path, traces: Sequence[Trace], title: str) -> None:
@@ -71,11 +73,14 @@ def draw_loop(path: Path, traces: Sequence[Trace], title: str) -> None:
 
 
 def _looks(traces: Sequence[Trace]) -> list[dict[str, Any]]:
-    """One line for each model; a run that was moved before has its model's line, with markers."""
+    """One line for each model; a run that was moved before or has a reflex has its model's line, with markers."""
     models = list(dict.fromkeys(trace.model for trace in traces))
-    return [
-        {**LOOKS[models.index(trace.model) % len(LOOKS)], **(_MOVED if trace.moved_before else {})} for trace in traces
-    ]
+    made = []
+    for trace in traces:
+        marker = _MARKERS.get((trace.moved_before, trace.reflex))
+        marked = {"marker": marker, **_MARKED} if marker else {}
+        made.append({**LOOKS[models.index(trace.model) % len(LOOKS)], **marked})
+    return made
 
 
 def _load_line(panels: list[list[Any]], trace: Trace) -> None:

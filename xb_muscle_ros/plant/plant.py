@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.resources
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -170,6 +170,11 @@ class Plant:
         self._data.ctrl[self._own] = activation
         self._data.act[:] = activation
         self._mj.mj_forward(self._model, self._data)
+
+    @property
+    def engine(self) -> tuple[Any, Any]:
+        """MuJoCo's model and data, for viewers, which read them only."""
+        return self._model, self._data
 
     def own_force_n(self) -> Array:
         """Pull of MuJoCo's muscles at the last step, shape (muscle,), N."""

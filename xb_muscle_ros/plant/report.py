@@ -124,10 +124,13 @@ def write(out: Path, traces: Sequence[Trace], settings: dict[str, object]) -> li
         {
             "model": trace.model,
             "moved_before": trace.moved_before,
+            "reflex": trace.reflex,
             "fibre": trace.fibre or None,
             # MuJoCo's own muscle is driven by activation, 0 to 1, the fibre's models by free calcium.
             **trace.driven_by,
             "start_acceleration_rad_per_s2": trace.start_acceleration_rad_per_s2,
+            "ended_before_its_time": trace.ended or None,
+            "beyond_lengths": trace.beyond or None,
             "numbers": numbers(trace),
         }
         for trace in traces
@@ -142,7 +145,13 @@ def _samples(traces: Sequence[Trace]) -> Iterator[dict[str, Any]]:
     """Long format: a row for each run and tick."""
     columns = [f"{m}.{what}" for what in ("force_n", "length_change_l0") for m in traces[0].muscles]
     names = ["model", "time_s", "angle_rad", "torque_nm", *columns]
+    drives = list(dict.fromkeys(kind for trace in traces for kind in trace.driven_by))
+    varies = any(trace.reflex for trace in traces)
     for trace in traces:
         data = (trace.time_s, trace.angle_rad, trace.torque_nm, trace.force_n, trace.length_change_l0)
-        for row in np.column_stack(data).tolist():
-            yield dict(zip(names, [trace.label, *row], strict=True))
+        for row, levels in zip(np.column_stack(data).tolist(), trace.level.tolist(), strict=True):
+            made = dict(zip(names, [trace.label, *row], strict=True))
+            for kind in drives if varies else ():
+                own = levels if kind in trace.driven_by else [None] * len(levels)
+                made.update({f"{m}.{kind}": level for m, level in zip(trace.muscles, own, strict=True)})
+            yield made

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 
 from xb_muscle_ros.cli.main import main
 from xb_muscle_ros.plant.leg.stance import Stance
@@ -62,7 +63,11 @@ def test_files_are_identical_when_repeated(tmp_path: Path, capsys: pytest.Captur
         (["--sway-hz", "0.3"], "sway frequency is 0.3 Hz; allowed are multiples of 0.25"),
         (["--duration", "0.1"], "--duration is 0.1 s; allowed in the scene myolegs is 0.3 to 10"),
         (["--speed", "0"], "platform's speed is 0; allowed is 0.001 to 5"),
-        (["--live"], "--live is for the scenes ankle and knee; drop it"),
+        (["--live"], "give one --model, and not mujoco"),
+        (["--live", "--model", "mujoco"], "give one --model, and not mujoco"),
+        (["--node-parameters", "leg.yaml", "--model", "mujoco"], "give one --model, and not mujoco"),
+        (["--model", "hill", "--reflex-length-per-l0", "1", "--reflex-muscle", "soleus"], "did you mean 'soleus_"),
+        (["--scene", "ankle", "--node-parameters", "leg.yaml"], "--node-parameters only with --scene myolegs"),
         (["--model", "3state_cop"], "did you mean '3state_coop"),
         (["--fiber", "nobody"], "fibre 'nobody' is not known"),
         (["--scene", "ankle", "--tone", "0.1"], "--tone only with --scene myolegs"),
@@ -86,3 +91,35 @@ def test_without_the_model(tmp_path: Path, capsys: pytest.CaptureFixture[str], m
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "pip install 'xb_muscle_ros[body]'" in said
+
+
+def test_parameter_file_of_the_leg_s_node(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing is run; an older file stays."""
+    file = tmp_path / "leg.yaml"
+    asked = ["loop", "--scene", "myolegs", "--model", "hill", "--node-parameters", str(file), "--out", str(tmp_path)]
+    assert main(asked) == 0
+    assert f"muscle_node --ros-args --params-file {file}" in capsys.readouterr().out
+    tree = yaml.safe_load(file.read_text())["/**"]["ros__parameters"]
+    assert len(tree["fibers"]) == 80
+    assert tree["model"] == "hill+active_force_length+passive_force_length"
+    assert tree["soleus_r"]["constants"]["f0_n"] > 1000.0
+    assert [path.name for path in tmp_path.iterdir()] == ["leg.yaml"]
+    assert main(asked) == 2
+    assert "leg.yaml exists; use --overwrite" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("found")
+def test_a_reflex_is_run_beside_its_absence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("xb_muscle_ros.plant.leg.figure.draw_leg", lambda *_: None)
+    asked = ["loop", "--scene", "myolegs", "--model", "hill", "--model", "mujoco", "--duration", "0.3", "--sway", "0"]
+    reflex = ["--reflex-length-per-l0", "3", "--reflex-muscle", "soleus_*"]
+    assert main([*asked, *reflex, "--out", str(tmp_path)]) == 0
+    tree = json.loads((tmp_path / "loop.json").read_text())
+    assert tree["reflex"]["muscles"] == ["soleus_*"]
+    assert [run["model"] for run in tree["runs"]] == ["hill", "hill, reflex", "mujoco", "mujoco, reflex"]
+    pushes = [[push["numbers"] for push in run["pushes"]] for run in tree["runs"]]
+    for without, having in (pushes[:2], pushes[2:]):
+        # Backwards, where soleus is stretched: stiffer, but not before the reflex.
+        assert having[1]["stiffness_20ms_mgh"] == without[1]["stiffness_20ms_mgh"]
+        assert having[1]["stiffness_100ms_mgh"] > without[1]["stiffness_100ms_mgh"]

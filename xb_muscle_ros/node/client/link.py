@@ -178,6 +178,16 @@ class Link:
         """State of the muscle node's lifecycle."""
         return str(self.call(GetState, "get_state", GetState.Request()).current_state.label)
 
+    def check_active(self) -> None:
+        """See whether the muscle node is active.
+
+        Raises:
+            UserError: it is not; with the command that makes it so.
+        """
+        state = self.state()
+        if state != "active":
+            raise UserError(f"node {self.peer} is {state}; activate it: ros2 lifecycle set {self.peer} activate")
+
     def reset(self) -> Account:
         """Make the muscle node forget its state; returns what it had taken since the last reset.
 

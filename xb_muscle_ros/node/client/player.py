@@ -73,9 +73,7 @@ def play_live(
 
 
 def _check(link: Link, trials: Sequence[Trial], fibre: Fibre | None, command: str) -> None:
-    state = link.state()
-    if state != "active":
-        raise UserError(f"node {link.peer} is {state}; activate it: ros2 lifecycle set {link.peer} activate")
+    link.check_active()
     wanted: dict[str, object] = {"mode": "lockstep"}
     if fibre is not None:
         wanted |= {n: v for n, v in flat(fibre).items() if not n.startswith(("source", "constants."))}

@@ -96,7 +96,7 @@ def play(
     body.place(stance.qpos)
     drive.reset()
     lead(body, drive, stance, sway, angle)
-    load, ankle, feet = body.load_nm_per_rad, body.ankle_m, _feet(body)
+    load, ankle, feet = body.load_nm_per_rad, body.ankle_m, feet_of(body)
     first = body.com_m
     soleus = body.muscles.index("soleus_r")
     rows: list[Array] = []
@@ -118,7 +118,7 @@ def play(
             acceleration = float(np.max(np.abs(data.qacc)))
         torque = -np.array([body.muscle_torque_nm(joint) for joint in JOINTS])
         rows.append(np.concatenate((seen, torque, [length], -data.actuator_force)))
-        if why := _fallen(com, first[2] - ankle[2], ankle, feet, body):
+        if why := fallen(com, first[2] - ankle[2], ankle, feet, body):
             end = End(at, why, fell=True)
             break
     table = np.array(rows)
@@ -143,13 +143,13 @@ def play(
     )
 
 
-def _feet(body: Body) -> tuple[float, float]:
+def feet_of(body: Body) -> tuple[float, float]:
     """Rearmost and foremost of the sole's points, forward, m."""
     along = body.sole_points() @ body.FORWARD
     return float(along.min()), float(along.max())
 
 
-def _fallen(com: Array, height_m: float, ankle: Array, feet: tuple[float, float], body: Body) -> str:
+def fallen(com: Array, height_m: float, ankle: Array, feet: tuple[float, float], body: Body) -> str:
     """How the body has fallen; empty: it has not."""
     along = float(com @ body.FORWARD)
     if along > feet[1]:
