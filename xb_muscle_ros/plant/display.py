@@ -11,7 +11,7 @@ from typing import Any
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import JointState
 
-from xb_muscle_ros.node.outputs import set_stamp
+from xb_muscle_ros.node.traffic import set_stamp
 
 WORLD = "world"
 

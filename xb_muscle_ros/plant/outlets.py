@@ -10,7 +10,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from sensor_msgs.msg import JointState
 
-from xb_muscle_ros.node.outputs import set_stamp
+from xb_muscle_ros.node.traffic import set_stamp
 from xb_muscle_ros.plant.body import MovedBody
 from xb_muscle_ros.plant.display import Display
 
