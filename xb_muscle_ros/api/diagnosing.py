@@ -158,14 +158,19 @@ def diagnose(
             are found by the fibre's name.
         model: parameter set of the fibre files; None: the one that the files name.
         method: how heads are distributed over strain; None: the files'.
-        reference_length, f0, trials_of: see `read_trials`; of bags only.
+        reference_length: see `read_trials`; of bags only.
+        f0: see `read_trials`; of bags only.
+        trials_of: see `read_trials`; of bags only.
         features: JSON table of measured SRS (F0/L0) and isometric force (F0) to be met beside the traces.
         predict: such a table that is predicted and compared, never fitted.
         nuisance: SDs of ordinary measurement errors where the study knows better, by name, such as
             ``{"time_shift": 0.002}`` (s).
         quick: look less hard: minutes become tens of seconds.
         seed: of the bootstrap.
-        processes, scheduler, journal, progress: see `fit`.
+        processes: see `fit`.
+        scheduler: see `fit`.
+        journal: see `fit`.
+        progress: see `fit`.
         tell: hears each warning; None: a `DataWarning` each.
 
     Returns:

@@ -139,13 +139,17 @@ def evaluate(
         fibre: names, fibre files or `Fibre`, one or several; empty: the package's file of a trial's fibre.
         model: parameter sets, one or several; None: all that the fibre files have.
         method: how heads are distributed over strain; None: the files'.
-        reference_length, f0, trials_of: see `read_trials`; of bags only.
+        reference_length: see `read_trials`; of bags only.
+        f0: see `read_trials`; of bags only.
+        trials_of: see `read_trials`; of bags only.
         settle: isometric time before each trial, s; None: until at rest.
         measured_only: the recordings alone, without models.
         skip_bad: leave recordings that cannot be evaluated out, in place of refusing all.
         empirical: JSON table of measured SRS; asks for the paper's grid of conditions.
         golden: JSON table of the authors' output, to be compared.
-        processes, scheduler, progress: see `fit`.
+        processes: see `fit`.
+        scheduler: see `fit`.
+        progress: see `fit`.
         out: folder that keeps finished work, so that an interrupted evaluation goes on where it was; None: nothing is
             kept.
         tell: hears each line on what was left out or taken for granted; None: a `DataWarning` each.

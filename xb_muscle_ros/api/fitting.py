@@ -184,8 +184,12 @@ def fit(
         trials: bags, folders of bags, `Trial` objects, or what `simulate` returned; of one fibre, in the order of
             recording, with measured force. Empty where `features` are all there is to meet.
         fibre: where the fit starts: name, fibre file or `Fibre`.
-        model, method, set: see `replay`.
-        reference_length, f0, trials_of: see `read_trials`; of bags only.
+        model: see `replay`.
+        method: see `replay`.
+        set: see `replay`.
+        reference_length: see `read_trials`; of bags only.
+        f0: see `read_trials`; of bags only.
+        trials_of: see `read_trials`; of bags only.
         hold_out: rules ``KEY=VALUE`` with KEY one of ``trial`` (with ``*`` and ``?``), ``pca``, ``amplitude`` (L0),
             ``recovery`` (s): trials that meet one are kept out of the fit.
         train: rules: only trials that meet one are fitted.

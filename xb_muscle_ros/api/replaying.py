@@ -113,7 +113,9 @@ def replay(
         model: parameter set of the fibre file; None: the file's default.
         method: how heads are distributed over strain; None: the file's.
         set: other values of parameters, by name.
-        reference_length, f0, trials_of: see `read_trials`; of bags only.
+        reference_length: see `read_trials`; of bags only.
+        f0: see `read_trials`; of bags only.
+        trials_of: see `read_trials`; of bags only.
         substeps: steps between two samples; 1 is what the node does.
         settle: isometric time before each trial, s; None: until at rest.
         live: play the trials through a running ``muscle_node`` in lockstep.
@@ -163,7 +165,9 @@ def check_options(substeps: int = 1, settle: float | None = None, live: bool = F
     """Check options that do not go with everything.
 
     Args:
-        substeps, settle, live: see `replay`.
+        substeps: see `replay`.
+        settle: see `replay`.
+        live: see `replay`.
         changed: whether the fibre has other values than its file.
 
     Raises:

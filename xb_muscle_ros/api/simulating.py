@@ -123,7 +123,9 @@ def simulate(
 
     Args:
         fibre: name, fibre file or `Fibre`.
-        model, method, set: see `replay`.
+        model: see `replay`.
+        method: see `replay`.
+        set: see `replay`.
         pca: of the bathing solution, one or several.
         amplitude: of the conditioning stretch, L0, one or several; 0: none.
         recovery: time before the test stretch, s, one or several.

@@ -130,7 +130,10 @@ class MuscleBatch:
         """The same as `step` and `output_table` in one pass, into arrays that are there already.
 
         Args:
-            states, length_change_l0, calcium_um, dt_s: see `step`.
+            states: see `step`.
+            length_change_l0: see `step`.
+            calcium_um: see `step`.
+            dt_s: see `step`.
             out: receives the states; another array than `states`.
             table: receives the outputs, shape (fibres, 11); without rows: none.
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import copy
 import functools
 import importlib
-import warnings
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.plant.engine import mujoco
+from xb_muscle_ros.plant.engine import mujoco, quiet
 from xb_muscle_ros.plant.plant import GRAVITY_M_S2, Array
 
 MODEL = "myolegs"
@@ -21,19 +18,6 @@ TICK_S = 0.001
 SIDES = ("r", "l")
 _SOLE = ("foot_col1", "foot_col3", "bofoot_col2")
 """Capsules that a foot stands on: two along the heel and midfoot, one across the toes."""
-
-
-@contextlib.contextmanager
-def _quiet(mj: Any) -> Iterator[None]:
-    """Keep to itself how MyoLeg's parts are put together; MuJoCo would write it into a file of the working folder."""
-    before = mj.get_mju_user_warning()
-    mj.set_mju_user_warning(lambda _: None)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        mj.set_mju_user_warning(before)
 
 
 @functools.cache
@@ -53,7 +37,7 @@ def _compiled() -> Any:
         raise UserError(
             f"myo_sim cannot be imported ({error}); install it with pip install 'xb_muscle_ros[body]'"
         ) from None
-    with _quiet(mj):
+    with quiet(mj):
         spec = myo_sim.load_spec(MODEL, build_kwargs={"postures": ["standing"]})
         geoms = list(spec.worldbody.geoms)
         floor = next(geom for geom in geoms if geom.type == mj.mjtGeom.mjGEOM_PLANE)
