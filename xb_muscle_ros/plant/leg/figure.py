@@ -29,6 +29,8 @@ def draw_leg(path: Path, runs: Sequence[ModelRuns]) -> None:
     """
     swayed = len(runs[0].pairs) > 1
     with figure(190.0, 128.0 if swayed else 72.0) as made:
+        # The last numbers under a panel reach beyond it, which the layout does not see.
+        made.get_layout_engine().set(rect=(0.0, 0.0, 0.985, 1.0))
         panels = made.subplots(2 if swayed else 1, 3, squeeze=False)
         for axes, at in ((panels[0][0], _BACKWARDS), (panels[0][1], _FORWARDS)):
             _ways(axes, runs, at)
@@ -105,8 +107,8 @@ def _losses(axes: Any, runs: Sequence[ModelRuns]) -> None:
     axes.axhline(0.0, color="black", linewidth=0.7)
     axes.set_xticks(ticks, [f"{100 * sway.fibre_l0:g} %\n{sway.frequency_hz:g} Hz" for sway in sways])
     times = ", ".join(f"{1000 * time_s:.0f}" for time_s in STIFFNESS_AT_S)
-    axes.set_xlabel(f"Sway before; from left: {times} ms after push")
-    axes.set_ylabel("Ankle stiffness, change by sway (%)")
+    axes.set_xlabel(f"Sway before; from left: at {times} ms")
+    axes.set_ylabel("Stiffness, change by sway (%)")
 
 
 def _sway_looks(one: ModelRuns) -> list[tuple[Pair, dict[str, Any]]]:
@@ -129,4 +131,4 @@ def _alone(axes: Any, one: ModelRuns) -> None:
     if last:
         axes.axvspan(0.0, 1e3 * _FIRST_S, color=SHADE, linewidth=0)
     axes.set_xlabel("Time (ms)")
-    axes.set_ylabel("Centre of mass without a push (mm)")
+    axes.set_ylabel("Way without a push (mm)")
