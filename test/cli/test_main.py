@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 
 import pytest
 
 from xb_muscle_ros.cli.main import COMMANDS, build_parser, main
+from xb_muscle_ros.errors import DataWarning
 
 
 @pytest.fixture(scope="module")
@@ -178,3 +180,15 @@ def test_every_command_is_in_the_full_parser() -> None:
         assert command.description, name
         for action in command._actions:
             assert action.help or action.dest == "step", (name, action.dest)
+
+
+def test_what_is_odd_in_data_is_a_line_and_not_a_place_in_the_code(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def odd(_: object) -> int:
+        warnings.warn("muscle a has no tendon", DataWarning, stacklevel=1)
+        return 0
+
+    monkeypatch.setattr("xb_muscle_ros.cli.parameters_command.run", odd)
+    assert main(["parameters"]) == 0
+    assert capsys.readouterr().err == "xb_muscle: warning: muscle a has no tendon\n"

@@ -94,8 +94,15 @@ def run(arguments: argparse.Namespace) -> int:
     runs = []
     with Progress(len(pairs) * count(swayed), "loop") as progress:
         for fibre, each in pairs:
-            with _drive(arguments, fibre, each) as make:
-                runs.append(run_model(make, stance, platform, swayed, duration, progress.update))
+            try:
+                with _drive(arguments, fibre, each) as make:
+                    runs.append(run_model(make, stance, platform, swayed, duration, progress.update))
+            except UserError as error:
+                if len(fibres) == 1:
+                    raise
+                common.warn(f"{error}; that model is left out")
+    if not runs:
+        raise UserError("none of the models can stand so; see the warnings, or give --lead, --knee or --tone")
     for line in ended(runs):
         common.warn(line)
     print(tables(runs))

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import importlib
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
+from typing import Any
 
 from xb_muscle_ros import __version__, programs
-from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.errors import DataWarning, UserError
 
 COMMANDS = {
     "demo": "replay the recordings of fibre 18Dec2017a offline and through the node",
@@ -45,7 +48,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit code. What a user can mend is one line on stderr and code 2."""
     try:
         arguments = build_parser().parse_args(argv)
-        return int(arguments.run(arguments))
+        with warnings.catch_warnings():
+            warnings.showwarning = functools.partial(_show, warnings.showwarning)
+            return int(arguments.run(arguments))
     except UserError as error:
         print(f"xb_muscle: error: {error}", file=sys.stderr)
         return 2
@@ -54,6 +59,16 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         print("xb_muscle: interrupted", file=sys.stderr)
         return 130
+
+
+def _show(otherwise: Callable[..., None], message: Warning | str, category: type[Warning], *where: Any) -> None:
+    """What was found odd in the user's data is one line, without a place in the code."""
+    if issubclass(category, DataWarning):
+        from xb_muscle_ros.cli.common import warn
+
+        warn(str(message))
+    else:
+        otherwise(message, category, *where)
 
 
 def _is_interruption(error: BaseException | None) -> bool:

@@ -108,6 +108,20 @@ def test_parameter_file_of_the_leg_s_node(tmp_path: Path, capsys: pytest.Capture
     assert "leg.yaml exists; use --overwrite" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("found")
+def test_a_model_that_cannot_stand_is_left_out_with_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    stiff = ["loop", "--scene", "myolegs", "--model", "hill", "--elastic-tendon", "--duration", "0.3", "--sway", "0"]
+    assert main([*stiff, "--model", "mujoco", "--out", str(tmp_path / "both")]) == 0
+    warned = capsys.readouterr().err.splitlines()
+    assert len(warned) == 1
+    assert "has no series element that could take an elastic tendon up" in warned[0]
+    assert warned[0].endswith("; that model is left out")
+    assert [run["model"] for run in json.loads((tmp_path / "both" / "loop.json").read_text())["runs"]] == ["mujoco"]
+    assert main([*stiff, "--out", str(tmp_path / "one")]) == 2
+    assert "left out" not in capsys.readouterr().err
+    assert not (tmp_path / "one").exists()
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("found")
 def test_a_reflex_is_run_beside_its_absence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
