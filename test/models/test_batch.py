@@ -72,3 +72,13 @@ def test_step_and_outputs_in_one_pass_are_those_of_two() -> None:
     assert table.tobytes() == batch.output_table(after).tobytes()
     with pytest.raises(UserError, match="fibre 13Dec2017a: length change is -2 L0"):
         batch.step_into(states, np.array([0.0, -2.0]), calcium, 1e-3, out, table)
+
+
+def test_after_warming_nothing_is_left_to_compile() -> None:
+    batch = MuscleBatch([load_fibre(name) for name in FIBRES[:2]])
+    batch.warm()
+    compiled = {f: len(f.signatures) for f in (batch._code.advance_many, batch._code.outputs_many)}
+    assert all(compiled.values())
+    states = batch.step(batch.settle(np.zeros(2), np.ones(2)), np.zeros(2), np.ones(2), 1e-3)
+    batch.outputs(states)
+    assert compiled == {f: len(f.signatures) for f in compiled}

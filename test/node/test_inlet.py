@@ -207,3 +207,14 @@ def test_numbers_of_a_publisher_tell_of_losses() -> None:
     assert arrivals.told() == "2, not counted while 2 publish"
     come(None)
     assert arrivals.told() == "not known with this middleware"
+
+
+def test_what_cannot_be_read_is_counted_and_over_with_the_next_good_message(one: Inlet, notes: Any) -> None:
+    one.refuse("length", Refusal("not readable", "3 bytes"))
+    assert one.refused["not readable"] == 1
+    assert list(one.refusing) == [("length", "")]
+    one.take_length(message([1.0]))
+    assert not one.refusing
+    one.open = False
+    one.refuse("length", Refusal("not readable", "3 bytes"))
+    assert one.refused["not readable"] == 1

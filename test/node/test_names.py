@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from many_fibres import NAMES
 
-from xb_muscle_ros.node.names import Names, front
+from xb_muscle_ros.node.names import Names, enumerated, front
 from xb_muscle_ros.node.rules import Refusal
 
 
@@ -47,3 +47,12 @@ def test_one_fibre_needs_no_name() -> None:
     """Of many some are named."""
     assert front(["left"], [0]) == ""
     assert front(NAMES, [2, 0]) == "back, left: "
+
+
+def test_what_is_said_of_names_has_an_end() -> None:
+    assert enumerated(["x" * 1000]) == "x" * 100 + "…"
+
+
+def test_no_names_stand_for_all() -> None:
+    with pytest.raises(Refusal, match="0 values in position for no names, which stand for all 3 fibres; send one per"):
+        Names(["a", "b", "c"]).places([], 0, "position")

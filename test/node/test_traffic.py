@@ -90,3 +90,22 @@ def test_bytes_and_whole_messages_say_the_same(domain: int, monkeypatch: pytest.
     assert all(found == present for _, found, *_ in quick["force"])
     assert all(len(position) == 6 * len(names) and not velocity for _, _, position, velocity, _ in quick["moments"])
     assert all(min(effort) > 0.0 for *_, effort in quick["force"])
+
+
+def test_bytes_that_are_no_message_are_refused_in_a_line() -> None:
+    """What comes after them is read as before; an executor would end with any other error."""
+    from rclpy.serialization import serialize_message
+    from sensor_msgs.msg import JointState
+
+    from xb_muscle_ros.node.rules import Refusal
+    from xb_muscle_ros.node.traffic import hearing
+
+    taken: list[Any] = []
+    refused: list[Refusal] = []
+    heard = hearing(taken.append, True, refused.append)
+    data = serialize_message(JointState(name=NAMES, position=[1.0, 2.0, 3.0]))
+    for sent in (data, data[:-9], data[:40], b"", data):
+        heard(sent)
+    assert [joints.position.tolist() for joints in taken] == [[1.0, 2.0, 3.0]] * 2
+    assert len(refused) == 3
+    assert str(refused[1]).startswith("not readable: 40 bytes are no sensor_msgs/JointState; look for")

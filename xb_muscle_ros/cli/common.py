@@ -56,11 +56,22 @@ def add_settle(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_out(parser: argparse.ArgumentParser, what: str, default: str | None = None, metavar: str = "DIR") -> None:
-    """Where results go (without a default the option has to be given), and whether they may replace older ones."""
+def add_out(
+    parser: argparse.ArgumentParser,
+    what: str,
+    default: str | None = None,
+    metavar: str = "DIR",
+    required: bool = True,
+) -> None:
+    """Where results go, and whether they may replace older ones.
+
+    Without a default the option has to be given, unless it is not `required`: the command then says when.
+    """
     text = what if default is None else f"{what} (default {default})"
     out = None if default is None else Path(default)
-    parser.add_argument("--out", type=Path, metavar=metavar, required=default is None, default=out, help=text)
+    parser.add_argument(
+        "--out", type=Path, metavar=metavar, required=required and default is None, default=out, help=text
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace the results of an older run")
 
 

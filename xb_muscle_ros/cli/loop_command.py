@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"parameter set, or mujoco for MuJoCo's own muscle (may be given again; default: {', '.join(_MODELS)}; in "
         f"the scene myolegs {', '.join(loop_leg.MODELS)})",
     )  # fmt: skip
-    common.add_out(parser, "folder for loop.json, loop.csv and the figure")
+    common.add_out(parser, "folder for loop.json, loop.csv and the figure", required=False)
     parser.add_argument(
         "--duration", type=float, metavar="S", help="length of the run, s (default: ankle 0.5, knee 4, myolegs 2)"
     )
@@ -51,6 +51,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run all models in the scene asked for, print the table, write the files."""
+    if arguments.scene != "myolegs":
+        loop_leg.refuse(arguments)
+    # A node's parameter file has a place of its own.
+    if arguments.out is None and arguments.node_parameters is None:
+        raise UserError("--out is missing; give a folder for loop.json, loop.csv and the figure")
     return _SCENES[arguments.scene](arguments)
 
 
@@ -76,7 +81,6 @@ def _run_joint(arguments: argparse.Namespace) -> int:
     given = platform_values(arguments)
     if scene == "knee" and given:
         raise UserError("--displacement, --speed and --acceleration are of the scenes ankle and myolegs; drop them")
-    loop_leg.refuse(arguments)
     platform = RampAndHold(**given)
     reflex = loop_reflex.reflex_of(arguments)
     # Before any model is compiled: is there an engine at all?

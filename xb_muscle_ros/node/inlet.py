@@ -67,6 +67,11 @@ class Inlet:
         self.refusing.clear()
         self._latched.clear()
 
+    def refuse(self, topic: str, refusal: Refusal) -> None:
+        """Count a message of ``muscle/<topic>`` that could not be read, and say so."""
+        if self.open:
+            self._refuse(topic, refusal, [])
+
     def take_length(self, message: Joints) -> None:
         """Callback of ``muscle/length``: position m, velocity m/s or none."""
         places = self._places("length", message) if self.open else None

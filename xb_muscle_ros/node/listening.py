@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -34,8 +35,8 @@ class Listening:
         self._bytes = as_bytes(node.get_logger())
         self._latched: Latched | None = Latched(node, "muscle/calcium", self._take_latched)
         self.arrivals = {
-            "calcium": Arrivals(hearing(inlet.take_calcium, self._bytes), self.look),
-            "length": Arrivals(hearing(inlet.take_length, self._bytes)),
+            "calcium": Arrivals(hearing(inlet.take_calcium, self._bytes, partial(inlet.refuse, "calcium")), self.look),
+            "length": Arrivals(hearing(inlet.take_length, self._bytes, partial(inlet.refuse, "length"))),
         }
         # Calcium first: where both wait, it is then taken before the length that needs it.
         calcium, length = (self._subscribe(topic) for topic in ("calcium", "length"))

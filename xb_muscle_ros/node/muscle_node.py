@@ -170,6 +170,9 @@ class MuscleNode(LifecycleNode):
 
     def _made(self, fibres: Sequence[Fibre], outlet: OutputMessages) -> Lockstep | Realtime:
         batch = MuscleBatch(fibres)
+        if len(batch) > 1:
+            # One fibre goes by itself, and is warm; no tick shall wait for a compiler.
+            batch.warm()
         # The first settling loads what later ones need.
         batch.muscles[0].settle(0.0, 0.1)
         log = self.get_logger()

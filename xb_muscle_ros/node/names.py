@@ -14,7 +14,7 @@ Indices = npt.NDArray[np.intp]
 
 KINDS_KEPT = 8
 """Lists of names that are remembered: as many senders may have a part of the fibres each."""
-_NAMES_SHOWN = 3
+_NAMES_SHOWN, _LETTERS_SHOWN = 3, 100
 # A sender that makes up names must not fill the memory.
 _STRANGERS_KEPT = 1000
 
@@ -56,7 +56,8 @@ class Names:
             Refusal: there are not as many values as names.
         """
         if values != (len(names) or len(self._all)):
-            detail = f"{values} values in {field} for {len(names)} names; send one per name"
+            whom = f"{len(names)} names" if names else f"no names, which stand for all {len(self._all)} fibres"
+            detail = f"{values} values in {field} for {whom}; send one per name"
             raise Refusal("wrong array size", detail)
         last, places = self._last
         if names is last:
@@ -92,7 +93,9 @@ class Names:
 
 def enumerated(names: Sequence[str]) -> str:
     """Some names, and how many more there are."""
-    shown = ", ".join(names[:_NAMES_SHOWN])
+    shown = ", ".join(
+        name if len(name) <= _LETTERS_SHOWN else f"{name[:_LETTERS_SHOWN]}…" for name in names[:_NAMES_SHOWN]
+    )
     return shown if len(names) <= _NAMES_SHOWN else f"{shown} and {len(names) - _NAMES_SHOWN} more"
 
 

@@ -18,6 +18,7 @@ from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.node.joint_state import FIELDS, Alike, Joints, Layout
 from xb_muscle_ros.node.names import KINDS_KEPT
+from xb_muscle_ros.node.rules import Refusal
 from xb_muscle_ros.node.stepping import Floats
 
 # Those for which bytes were tried.
@@ -32,14 +33,23 @@ class Reader:
         self._known: list[tuple[Layout, Alike]] = []
 
     def __call__(self, data: bytes) -> Joints:
-        """What a message says."""
+        """What a message says.
+
+        Raises:
+            Refusal: the bytes are no JointState.
+        """
         known = self._known
         for k, (layout, alike) in enumerate(known):
             if alike(data):
                 if k:
                     known.insert(0, known.pop(k))
                 return _read(layout, data)
-        joints = Joints.of(deserialize_message(data, JointState))
+        try:
+            message = deserialize_message(data, JointState)
+        except RuntimeError:
+            told = f"{len(data)} bytes are no sensor_msgs/JointState; look for another type's publisher on this topic"
+            raise Refusal("not readable", told) from None
+        joints = Joints.of(message)
         found = Layout.of(data)
         # Only a layout that leads to what ROS has read is followed from now on.
         if found is not None and _same(_read(found, data), joints):
@@ -95,12 +105,25 @@ def as_bytes(log: Any = None) -> bool:
     return False
 
 
-def hearing(take: Callable[[Joints], Any], bytes_: bool) -> Callable[[Any], None]:
-    """A callback for a subscription, `raw` where `bytes_`, that hands on what its messages say."""
+def hearing(
+    take: Callable[[Joints], Any], bytes_: bool, refuse: Callable[[Refusal], Any] = lambda _: None
+) -> Callable[[Any], None]:
+    """A callback for a subscription, `raw` where `bytes_`, that hands on what its messages say.
+
+    Args:
+        take: is given what a message says.
+        bytes_: whether messages come as bytes.
+        refuse: is told of bytes that are no message; the middleware drops them unsaid where messages come whole.
+    """
     read: Callable[[Any], Joints] = Reader() if bytes_ else Joints.of
 
     def heard(message: Any) -> None:
-        take(read(message))
+        try:
+            joints = read(message)
+        except Refusal as refusal:
+            refuse(refusal)
+            return
+        take(joints)
 
     return heard
 
@@ -108,7 +131,9 @@ def hearing(take: Callable[[Joints], Any], bytes_: bool) -> Callable[[Any], None
 def subscribe(node: Any, topic: str, take: Callable[[Joints], Any], qos: Any) -> Any:
     """A subscription of JointStates; `take` is given what they say."""
     bytes_ = as_bytes()
-    return node.create_subscription(JointState, topic, hearing(take, bytes_), qos, raw=bytes_)
+    log = node.get_logger()
+    heard = hearing(take, bytes_, lambda refusal: log.warning(f"{topic} refused: {refusal}", throttle_duration_sec=5.0))
+    return node.create_subscription(JointState, topic, heard, qos, raw=bytes_)
 
 
 def set_stamp(message: JointState, stamp_ns: int) -> None:

@@ -15,6 +15,8 @@ from xb_muscle_ros.plant.mjcf.own_force import OwnForce
 
 mujoco = pytest.importorskip("mujoco")
 
+FIRST = 'lengthrange="0.2 0.35" range="0.6 1.4" force="500" lmin="0.5" lmax="1.6"'
+
 
 def standing(model: Any) -> Any:
     data = mujoco.MjData(model)
@@ -122,6 +124,65 @@ def test_an_operating_range_that_falls_is_refused(arm: Callable[..., Any]) -> No
     model = arm()
     model.actuator_gainprm[0, :2] = 1.2, 0.8
     with pytest.raises(UserError, match=r"muscle flexor has operating range 1.2 to 0.8 L0; needed is range='low high'"):
+        read_muscles(model)
+
+
+def test_a_muscle_weakened_by_its_gain_alone_keeps_its_passive_force(arm: Callable[..., Any]) -> None:
+    model = arm()
+    model.actuator_gainprm[0, 2] *= 0.5
+    muscles = read_muscles(model)
+    assert muscles.f0_n[0] == 250.0
+    own = OwnForce(mujoco, muscles.fl_min[0], muscles.fl_max[0], muscles.fp_max[0])
+    data = mujoco.MjData(model)
+    compared = 0
+    for angle in np.linspace(0.0, 2.0, 21):
+        data.qpos[0] = angle
+        mujoco.mj_forward(model, data)
+        length = (data.actuator_length[:1] - muscles.slack_m[:1]) / muscles.l0_m[:1]
+        assert own.passive_f0(length)[0] * 250.0 == pytest.approx(-data.actuator_force[0], abs=1e-9)
+        compared += data.actuator_force[0] < -1.0
+    assert compared
+
+
+def test_active_and_passive_force_of_other_lengths_are_refused(arm: Callable[..., Any]) -> None:
+    for place, said in ((1, "operating range 0.6 to 1.4 in gainprm and 0.6 to 1.3 in biasprm"), (5, "lmax 1.6 in")):
+        model = arm()
+        model.actuator_biasprm[0, place] -= 0.1
+        with pytest.raises(UserError, match=said):
+            read_muscles(model)
+
+
+@pytest.mark.parametrize("last", [np.inf, np.nan])
+def test_a_length_range_without_end_is_refused(arm: Callable[..., Any], last: float) -> None:
+    model = arm()
+    model.actuator_lengthrange[0, 1] = last
+    with pytest.raises(UserError, match=r"muscle flexor has length range 0.2 to"):
+        read_muscles(model)
+
+
+def test_a_delay_is_refused(arm: Callable[..., Any]) -> None:
+    """It would hold back the fibre's force."""
+    if not hasattr(arm(), "actuator_delay"):
+        pytest.skip("this version of MuJoCo has no delays")
+    with pytest.raises(UserError, match=r"muscle flexor has a delay of 0.003 s.*delay the excitation"):
+        read_muscles(arm(first=FIRST + ' nsample="4" delay="0.003"'))
+
+
+def test_a_muscle_that_is_disabled_is_named(arm: Callable[..., Any]) -> None:
+    model = arm(first=FIRST + ' group="3"')
+    assert read_muscles(model).warnings == ()
+    model.opt.disableactuator = 1 << 3
+    (line,) = read_muscles(model).warnings
+    assert line.startswith("flexor: disabled by the model's options")
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+    (line,) = read_muscles(model).warnings
+    assert line.startswith("flexor, extensor: disabled")
+
+
+def test_a_model_that_was_bridged_before_is_told_of(arm: Callable[..., Any]) -> None:
+    model = arm()
+    make_plain(model, read_muscles(model).index)
+    with pytest.raises(UserError, match="was given this model before: load it again"):
         read_muscles(model)
 
 

@@ -173,3 +173,40 @@ def test_tendons_that_have_no_length_and_force_ranges_are_told(arm: Callable[...
 
 def test_the_public_name_is_this_class() -> None:
     assert xb.CrossBridgeMuscles is CrossBridgeMuscles
+
+
+def test_calcium_of_a_tick_is_a_number_or_one_for_each_muscle(arm: Callable[..., Any]) -> None:
+    """More numbers than muscles are not taken in part."""
+    model = arm()
+    muscles, data = CrossBridgeMuscles(model), mujoco.MjData(model)
+    muscles.reset(data, 0.5)
+    mujoco.mj_step1(model, data)
+    assert muscles.advance(data, 0.5).shape == (2,)
+    for calcium in ([0.5] * 3, [[0.5, 0.5]]):
+        with pytest.raises(UserError, match=r"calcium has shape .*; needed is \(2,\) or one number"):
+            muscles.advance(data, calcium)
+
+
+def test_a_time_step_beyond_the_time_constants_is_named(arm: Callable[..., Any]) -> None:
+    model = arm()
+    model.opt.timestep = 0.02
+    muscles, data = CrossBridgeMuscles(model), mujoco.MjData(model)
+    muscles.reset(data)
+    muscles.step(data, 1.0)
+    with pytest.raises(
+        UserError, match=r"activation of flexor is [0-9.]+; allowed is 0 to 1; the time step is too long"
+    ):
+        muscles.step(data, 1.0)
+
+
+def test_data_of_another_model_is_refused(arm: Callable[..., Any]) -> None:
+    """MuJoCo would read and write beyond its arrays; data of a copy will do."""
+    model = arm()
+    muscles = CrossBridgeMuscles(model)
+    muscles.reset(mujoco.MjData(copy.copy(model)), 0.1)
+    other = mujoco.MjData(arm(before='<motor joint="elbow"/>'))
+    for call in (muscles.reset, muscles.step):
+        with pytest.raises(UserError, match="data is of a model with 3 actuators, the muscles are of one with 2"):
+            call(other, 0.1)
+        with pytest.raises(UserError, match="data is of type MjModel; needed is an MjData"):
+            call(model, 0.1)

@@ -70,3 +70,9 @@ def test_files_that_hold_no_table(tmp_path: Path, text: str | None, said: str) -
     with pytest.raises(UserError, match=rf"table {path} {said}") as error:
         choices(path, NAMES)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("table", [5, ["soleus_r"]])
+def test_what_is_no_table_is_named(table: Any) -> None:
+    with pytest.raises(UserError, match=r"table is of type (int|list); needed is a YAML file or the mapping"):
+        choices(table, NAMES)

@@ -81,16 +81,18 @@ def read_muscles(model: Any) -> MuscleActuators:
     if not index.size:
         raise UserError(
             f"the model has no muscles among its {model.nu} actuators; give it one with "
-            '<muscle name="..." tendon="..."/> under <actuator>'
+            '<muscle name="..." tendon="..."/> under <actuator> (fibres have taken their place where '
+            "CrossBridgeMuscles was given this model before: load it again, or give a copy made before)"
         )
     names = tuple(mj.mj_id2name(model, mj.mjtObj.mjOBJ_ACTUATOR, int(i)) or f"actuator_{i}" for i in index)
     _refuse_others(model, mj, index, names)
     gain, length = model.actuator_gainprm[index], model.actuator_lengthrange[index]
     _refuse_ranges(names, gain, length)
     l0_m = (length[:, 1] - length[:, 0]) / np.maximum(gain[:, 1] - gain[:, 0], _LEAST)
-    given = gain[:, 2]
-    f0_n = np.where(given < 0.0, gain[:, 3] / np.maximum(model.actuator_acc0[index], _LEAST), given)
+    f0_n = _peak_n(model, index, gain)
     _refuse_forces(names, f0_n)
+    bias = model.actuator_biasprm[index]
+    _refuse_two_curves(names, gain, bias)
     limited = model.actuator_ctrllimited[index].astype(bool)[:, None]
     excitation = np.where(limited, model.actuator_ctrlrange[index], (-np.inf, np.inf))
     limited = model.actuator_actlimited[index].astype(bool)[:, None]
@@ -103,7 +105,7 @@ def read_muscles(model: Any) -> MuscleActuators:
         range_l0=gain[:, :2].copy(),
         fl_min=gain[:, 4].copy(),
         fl_max=gain[:, 5].copy(),
-        fp_max=gain[:, 7].copy(),
+        fp_max=_passive_f0(bias[:, 7], _peak_n(model, index, bias), f0_n),
         activation_s=model.actuator_dynprm[index, 0],
         deactivation_s=model.actuator_dynprm[index, 1],
         smoothing=model.actuator_dynprm[index, 2],
@@ -111,7 +113,7 @@ def read_muscles(model: Any) -> MuscleActuators:
         excitation_range=np.clip(excitation, 0.0, 1.0),
         activation_range=np.where(limited, model.actuator_actrange[index], (-np.inf, np.inf)),
         early=model.actuator_actearly[index].astype(bool),
-        warnings=_left_out(names, model.actuator_forcelimited[index]),
+        warnings=(*_left_out(names, model.actuator_forcelimited[index]), *_disabled(model, mj, index, names)),
     )
 
 
@@ -151,11 +153,19 @@ def _refuse_others(model: Any, mj: Any, index: npt.NDArray[np.int64], names: tup
                 f"actuator {names[other[0]]} has gaintype muscle but another {what}; allowed is muscle for all three "
                 "of gaintype, biastype and dyntype, as <muscle .../> sets them"
             )
+    # Older versions of MuJoCo have no delays.
+    delayed = np.flatnonzero(getattr(model, "actuator_delay", np.zeros(model.nu))[index] > 0.0)
+    if delayed.size:
+        name = names[delayed[0]]
+        raise UserError(
+            f"muscle {name} has a delay of {model.actuator_delay[index[delayed[0]]]:g} s, by which MuJoCo would hold "
+            "the fibre's force back in place of its excitation; set delay to 0 and delay the excitation"
+        )
 
 
 def _refuse_ranges(names: tuple[str, ...], gain: Array, length: Array) -> None:
     for name, (low, high), (first, last) in zip(names, gain[:, :2].tolist(), length.tolist(), strict=True):
-        if not first < last:
+        if not (first < last and np.isfinite((first, last)).all()):
             raise UserError(
                 f"muscle {name} has length range {first:g} to {last:g}, which fixes no fibre length; let the compiler "
                 "find it (<compiler><lengthrange .../></compiler>), call mujoco.mj_setLengthRange, or give lengthrange"
@@ -164,6 +174,46 @@ def _refuse_ranges(names: tuple[str, ...], gain: Array, length: Array) -> None:
             raise UserError(
                 f"muscle {name} has operating range {low:g} to {high:g} L0; needed is range='low high', rising"
             )
+
+
+def _peak_n(model: Any, index: npt.NDArray[np.int64], prm: Array) -> Array:
+    """Peak force of a muscle's gain or bias, N."""
+    given = prm[:, 2]
+    peak: Array = np.where(given < 0.0, prm[:, 3] / np.maximum(model.actuator_acc0[index], _LEAST), given)
+    return peak
+
+
+def _passive_f0(fp_max: Array, peak_n: Array, f0_n: Array) -> Array:
+    """Passive force in F0 of the active force: who weakens a muscle by its gain alone leaves passive force as it is."""
+    found: Array = np.where(peak_n == f0_n, fp_max, fp_max * peak_n / f0_n)
+    return found
+
+
+def _refuse_two_curves(names: tuple[str, ...], gain: Array, bias: Array) -> None:
+    """Refuse active and passive force that are of other fibre lengths; their size may differ."""
+    for places, what in (([0, 1], "operating range"), ([5], "lmax")):
+        other = np.flatnonzero((gain[:, places] != bias[:, places]).any(axis=1))
+        if other.size:
+            k = other[0]
+            raise UserError(
+                f"muscle {names[k]} has {what} {_listed(gain[k, places])} in gainprm and {_listed(bias[k, places])} in "
+                "biasprm; allowed is the same in both, as <muscle .../> sets them"
+            )
+
+
+def _listed(values: Array) -> str:
+    return " to ".join(f"{value:g}" for value in values.tolist())
+
+
+def _disabled(model: Any, mj: Any, index: npt.NDArray[np.int64], names: tuple[str, ...]) -> tuple[str, ...]:
+    """A line on muscles whose force MuJoCo leaves out at the moment."""
+    groups = model.actuator_group[index]
+    off = (groups >= 0) & (groups < 31) & ((model.opt.disableactuator >> np.clip(groups, 0, 30)) & 1).astype(bool)
+    if model.opt.disableflags & mj.mjtDisableBit.mjDSBL_ACTUATION:
+        off = np.ones_like(off)
+    some = [name for name, there in zip(names, off.tolist(), strict=True) if there]
+    what = f"{', '.join(some)}: disabled by the model's options, so that MuJoCo leaves out what their fibres pull with"
+    return (what,) if some else ()
 
 
 def _left_out(names: tuple[str, ...], limited: Array) -> tuple[str, ...]:

@@ -28,6 +28,7 @@ class _Group:
     def __init__(self, fibres: Sequence[Fibre], places: npt.NDArray[np.int64]) -> None:
         self.members = members_of(places)
         self.batch = MuscleBatch(fibres)
+        self.batch.warm()
         self.states: Array = np.stack([muscle.rest() for muscle in self.batch.muscles])
         self.spare: Array = np.empty_like(self.states)
         self.table: Array = self.batch.output_table(self.states)

@@ -20,6 +20,8 @@ from xb_muscle_ros.plant.mjcf.table import Table, choices
 from xb_muscle_ros.plant.plant import Array
 
 _LEVELS = np.linspace(0.0, 1.0, POINTS)
+_SIZES = {"nq": "positions", "nv": "velocities", "nu": "actuators", "na": "activations", "nbody": "bodies"}
+_OVERSHOT = "; the time step is too long for the muscle's time constants: make opt.timestep less than half of timeconst"
 
 
 class CrossBridgeMuscles:
@@ -137,6 +139,7 @@ class CrossBridgeMuscles:
         Raises:
             UserError: a length or calcium that no fibre has; names the muscle.
         """
+        self._refuse_foreign(data)
         calcium = self._each("calcium", calcium_um)
         self._mj.mj_fwdPosition(self._model, data)
         force = self.fibre_groups.settle(self.length_change_l0(data), calcium)
@@ -144,12 +147,12 @@ class CrossBridgeMuscles:
         self.activation = np.array([np.interp(c, row, _LEVELS) for c, row in zip(calcium, rows, strict=True)])
         return self._pull(data, force)
 
-    def advance(self, data: Any, calcium_um: Array) -> Array:
+    def advance(self, data: Any, calcium_um: npt.ArrayLike) -> Array:
         """Carry all fibres over one time step to the length of now, after `mj_step1` and before `mj_step2`.
 
         Args:
             data: MjData; its `ctrl` is set.
-            calcium_um: shape (muscle,), µM, held since the last tick.
+            calcium_um: a number, or shape (muscle,), µM, held since the last tick.
 
         Returns:
             pulls, shape (muscle,), N.
@@ -158,7 +161,8 @@ class CrossBridgeMuscles:
             UserError: a length or calcium that no fibre has; names the muscle.
             StateViolation: a fibre's state left its bounds.
         """
-        return self._pull(data, self.fibre_groups.advance(self.length_change_l0(data), calcium_um, self._timestep_s))
+        calcium = self._each("calcium", calcium_um)
+        return self._pull(data, self.fibre_groups.advance(self.length_change_l0(data), calcium, self._timestep_s))
 
     def step(self, data: Any, excitation: npt.ArrayLike) -> Array:
         """One step of model and muscles, in place of `mj_step`.
@@ -175,11 +179,12 @@ class CrossBridgeMuscles:
         Raises:
             UserError, StateViolation: see `advance`; or an excitation that is not finite.
         """
+        self._refuse_foreign(data)
         wanted = self._each("excitation", excitation)
         after = self._dynamics.after(self.activation, wanted, self._timestep_s)
         self._mj.mj_step1(self._model, data)
         acting = self.activation if self._early is None else np.where(self._early, after, self.activation)
-        pull = self.advance(data, self._calcium(acting))
+        pull = self.advance(data, self._calcium(acting, _OVERSHOT))
         self._mj.mj_step2(self._model, data)
         self.activation = after
         return pull
@@ -192,16 +197,34 @@ class CrossBridgeMuscles:
     def _timestep_s(self) -> float:
         return float(self._model.opt.timestep)
 
+    def _refuse_foreign(self, data: Any) -> None:
+        """Refuse what is no MjData of this model: MuJoCo itself would read and write beyond its arrays.
+
+        Raises:
+            UserError: sizes differ, or there are none.
+        """
+        other = getattr(data, "model", None)
+        if other is self._model:
+            return
+        if not isinstance(data, self._mj.MjData):
+            raise UserError(f"data is of type {type(data).__name__}; needed is an MjData of the model given before")
+        for size, what in _SIZES.items():
+            if getattr(other, size) != (own := getattr(self._model, size)):
+                raise UserError(
+                    f"data is of a model with {getattr(other, size)} {what}, the muscles are of one with {own}; give "
+                    "an MjData of the model that CrossBridgeMuscles was given"
+                )
+
     def _pull(self, data: Any, force_f0: Array) -> Array:
         pull: Array = self.f0_n * force_f0
         data.ctrl[self._place] = -pull
         return pull
 
-    def _calcium(self, activation: Array) -> Array:
+    def _calcium(self, activation: Array, remedy: str = "") -> Array:
         out = np.empty_like(activation)
         k = looked_up(activation, self._tables, self._table, out)
         if k >= 0:
-            raise UserError(f"activation of {self.names[k]} is {activation[k]:g}; allowed is 0 to 1")
+            raise UserError(f"activation of {self.names[k]} is {activation[k]:g}; allowed is 0 to 1{remedy}")
         return out
 
     def _each(self, what: str, given: npt.ArrayLike) -> Array:

@@ -71,6 +71,8 @@ def _read(table: Table) -> tuple[str, Mapping[str, Any]]:
     if table is None or isinstance(table, Mapping):
         return "table", table or {}
     where = f"table {table}"
+    if not isinstance(table, (str, Path)):
+        raise UserError(f"table is of type {type(table).__name__}; needed is a YAML file or the mapping that one holds")
     try:
         tree = fast_yaml.load(Path(table).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
