@@ -12,9 +12,23 @@ _DUMPER: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 _NO_WRAP = 2**31 - 1
 
 
+class _OnceLoader(_SAFE_LOADER):  # type: ignore[misc]
+    """YAML allows a key once in a mapping; PyYAML takes the last one without a word."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:
+        lines: dict[tuple[str, str], int] = {}
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                line = key.start_mark.line + 1
+                first = lines.setdefault((key.tag, key.value), line)
+                if first != line:
+                    raise yaml.YAMLError(f"key '{key.value}' is there twice, on line {first} and on line {line}")
+        return super().construct_mapping(node, deep)
+
+
 def load(text: str | bytes) -> Any:
-    """A document; raises `yaml.YAMLError`."""
-    return yaml.load(text, Loader=_SAFE_LOADER)
+    """A document; raises `yaml.YAMLError`, also for a key that is there twice."""
+    return yaml.load(text, Loader=_OnceLoader)
 
 
 def load_text(text: str | bytes) -> Any:

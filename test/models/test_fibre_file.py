@@ -231,3 +231,12 @@ def test_values_supply_what_a_swapped_block_lacks() -> None:
     assert (fibre.values["JF"], fibre.values["f"], fibre.values["kse"]) == (2.0, 95.0, bare.values["kse"])
     with pytest.raises(UserError, match="--set: parameter 'JF' is -1"):
         load_fibre("18Dec2017a", model, values={"JF": -1.0})
+
+
+def test_a_parameter_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+    """The last one would win without a word."""
+    text = find_fibre_file("18Dec2017a").read_text(encoding="utf-8")
+    path = tmp_path / "twice.yaml"
+    path.write_text(text.replace("\n        f: ", "\n        f: 1.0\n        f: ", 1), encoding="utf-8")
+    with pytest.raises(UserError, match=r"not valid YAML: key 'f' is there twice, on line \d+ and on line \d+; mend"):
+        load_fibre(path)

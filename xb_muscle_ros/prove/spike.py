@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from xb_muscle_ros import fast_yaml
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import write_text
 from xb_muscle_ros.prove.generator.artefacts import Artefacts
@@ -121,7 +122,7 @@ def _world(fiber: Path) -> World:
         UserError: the file is no fibre file, or its model is none of the generator's.
     """
     try:
-        inner = yaml.safe_load(fiber.read_text(encoding="utf-8"))["/**"]["ros__parameters"]
+        inner = fast_yaml.load(fiber.read_text(encoding="utf-8"))["/**"]["ros__parameters"]
         model, values = str(inner["model"]), {k: float(v) for k, v in inner["models"][inner["model"]].items()}
     except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError) as error:
         raise UserError(f"fibre file {fiber} cannot be read ({error}); give the path of a fibre file") from error

@@ -108,7 +108,6 @@ def test_parameter_file_of_the_leg_s_node(tmp_path: Path, capsys: pytest.Capture
     assert "leg.yaml exists; use --overwrite" in capsys.readouterr().err
 
 
-<<<<<<< HEAD
 @pytest.mark.usefixtures("found")
 def test_a_model_that_cannot_stand_is_left_out_with_a_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     stiff = ["loop", "--scene", "myolegs", "--model", "hill", "--elastic-tendon", "--duration", "0.3", "--sway", "0"]
@@ -121,7 +120,8 @@ def test_a_model_that_cannot_stand_is_left_out_with_a_line(tmp_path: Path, capsy
     assert main([*stiff, "--out", str(tmp_path / "one")]) == 2
     assert "left out" not in capsys.readouterr().err
     assert not (tmp_path / "one").exists()
-=======
+
+
 @pytest.mark.parametrize(
     ("extra", "said"),
     [
@@ -132,7 +132,6 @@ def test_a_model_that_cannot_stand_is_left_out_with_a_line(tmp_path: Path, capsy
 def test_a_run_needs_a_folder(extra: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["loop", *extra]) == 2
     assert said in capsys.readouterr().err
->>>>>>> da62d4b0d0eb9b0c91a5140f6bb63a41564c36fc
 
 
 @pytest.mark.slow

@@ -210,3 +210,42 @@ def test_data_of_another_model_is_refused(arm: Callable[..., Any]) -> None:
             call(other, 0.1)
         with pytest.raises(UserError, match="data is of type MjModel; needed is an MjData"):
             call(model, 0.1)
+
+
+def test_time_that_goes_back_asks_for_a_reset(arm: Callable[..., Any]) -> None:
+    """Both by hand and by the engine, which begins anew after a step that became unstable."""
+    model = arm()
+    muscles, data = CrossBridgeMuscles(model), mujoco.MjData(model)
+    muscles.reset(data, 0.1)
+    for _ in range(3):
+        muscles.step(data, 0.1)
+    mujoco.mj_resetData(model, data)
+    with pytest.raises(UserError, match=r"time of data went back from 0\.002 to 0 s .* settle them by reset"):
+        muscles.step(data, 0.1)
+    muscles.reset(data, 0.1)
+    muscles.step(data, 0.1)
+    muscles.step(data, 0.1)
+    data.qvel[0] = np.nan
+    with pytest.raises(UserError, match=r"time of data went back from 0\.001 to 0 s"):
+        muscles.step(data, 0.1)
+
+
+def test_an_integrator_that_is_changed_later_is_refused(arm: Callable[..., Any]) -> None:
+    model = arm()
+    muscles, data = CrossBridgeMuscles(model), mujoco.MjData(model)
+    muscles.reset(data, 0.1)
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    with pytest.raises(UserError, match="the model's integrator is RK4"):
+        muscles.step(data, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ({"parameters": {"Fscale": 3.0}}, "Fscale is set such that the fibre pulls with one F0"),
+        ({"fibre": "18Dec2017"}, "fibre '18Dec2017' is not known; did you mean '18Dec2017"),
+    ],
+)
+def test_the_muscle_of_a_wrong_entry_is_named(arm: Callable[..., Any], entry: dict[str, Any], said: str) -> None:
+    with pytest.raises(UserError, match=f"extensor.*{said}"):
+        CrossBridgeMuscles(arm(), {"muscles": {"extensor": entry}})

@@ -61,7 +61,12 @@ def test_what_is_wrong_is_named(table: dict[str, Any], said: str) -> None:
 
 @pytest.mark.parametrize(
     ("text", "said"),
-    [("default: {", "is not valid YAML"), ("- soleus", "holds a list"), (None, "cannot be read")],
+    [
+        ("default: {}\ndefault: {}", "is not valid YAML: key 'default' is there twice, on line 1 and on line 2"),
+        ("default: {", "is not valid YAML"),
+        ("- soleus", "holds a list"),
+        (None, "cannot be read"),
+    ],
 )
 def test_files_that_hold_no_table(tmp_path: Path, text: str | None, said: str) -> None:
     path = tmp_path / "leg.yaml"

@@ -7,7 +7,7 @@ from importlib import resources
 from types import MappingProxyType
 from typing import NamedTuple
 
-import yaml
+from xb_muscle_ros import fast_yaml
 
 
 class Term(NamedTuple):
@@ -18,5 +18,5 @@ class Term(NamedTuple):
 
 
 _TEXT = resources.files("xb_muscle_ros.diagnose.report").joinpath("glossary.yaml").read_text(encoding="utf-8")
-GLOSSARY: Mapping[str, Term] = MappingProxyType({key: Term(**row) for key, row in yaml.safe_load(_TEXT).items()})
+GLOSSARY: Mapping[str, Term] = MappingProxyType({key: Term(**row) for key, row in fast_yaml.load(_TEXT).items()})
 """Every term by its key."""

@@ -136,13 +136,22 @@ def make_plain(model: Any, index: npt.NDArray[np.int64]) -> None:
     model.actuator_actearly[index] = 0
 
 
-def _refuse_others(model: Any, mj: Any, index: npt.NDArray[np.int64], names: tuple[str, ...]) -> None:
-    """Refuse what cannot be stepped around, and actuators that are muscles in part only."""
+def refuse_substeps(model: Any, mj: Any) -> None:
+    """Refuse an integrator that asks for forces several times a step.
+
+    Raises:
+        UserError: Runge-Kutta.
+    """
     if model.opt.integrator == mj.mjtIntegrator.mjINT_RK4:
         raise UserError(
             "the model's integrator is RK4, which asks for forces four times a step; fibres give them once: set "
             'model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST (or <option integrator="implicitfast"/>)'
         )
+
+
+def _refuse_others(model: Any, mj: Any, index: npt.NDArray[np.int64], names: tuple[str, ...]) -> None:
+    """Refuse what cannot be stepped around, and actuators that are muscles in part only."""
+    refuse_substeps(model, mj)
     for kinds, what, wanted in (
         (model.actuator_biastype, "biastype", mj.mjtBias.mjBIAS_MUSCLE),
         (model.actuator_dyntype, "dyntype", mj.mjtDyn.mjDYN_MUSCLE),

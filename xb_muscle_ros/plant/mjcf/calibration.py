@@ -53,7 +53,15 @@ def calibrated(choice: Choice, where: str) -> Calibration:
     """
     name, *mechanisms = choice.model.split(SEPARATOR)
     bare = with_mechanisms(name, *(m for m in mechanisms if m not in RELATIONS))
-    fibre = load_fibre(choice.fibre, bare, choice.method)
+    if "Fscale" in choice.parameters:
+        raise UserError(
+            f"{where}: Fscale is set such that the fibre pulls with one F0 when it is fully active; leave it out, and "
+            "change the muscle's force in the model"
+        )
+    try:
+        fibre = load_fibre(choice.fibre, bare, choice.method, values=choice.parameters)
+    except UserError as error:
+        raise UserError(f"{where}: {error}") from error
     none = {name: 0.0 for name in ("kpe", "Fpe0") if name in fibre.values}
     fibre = changed(fibre, {**none, **choice.parameters}, where)
     muscle = Muscle(fibre)
@@ -66,7 +74,7 @@ def calibrated(choice: Choice, where: str) -> Calibration:
         raise UserError(
             f"{where}: fibre {fibre.name}, model {fibre.model} pulls with {full:.3g} F0 at pCa {FULL_PCA:g}"
         )
-    whole = load_fibre(choice.fibre, with_mechanisms(bare, *RELATIONS), choice.method)
+    whole = load_fibre(choice.fibre, with_mechanisms(bare, *RELATIONS), choice.method, values=choice.parameters)
     whole = changed(whole, {**fibre.values, "Fscale": fibre.values["Fscale"] / full}, where)
     pca = list(np.linspace(RELAXED_PCA, FULL_PCA, _FIRST_POINTS))
     share = [force(_um(value)) / full for value in pca]

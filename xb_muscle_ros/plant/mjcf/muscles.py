@@ -11,7 +11,7 @@ import numpy.typing as npt
 from xb_muscle_ros.errors import DataWarning, UserError
 from xb_muscle_ros.plant.engine import mujoco
 from xb_muscle_ros.plant.mjcf.activation import ActivationDynamics
-from xb_muscle_ros.plant.mjcf.actuators import make_plain, read_muscles
+from xb_muscle_ros.plant.mjcf.actuators import make_plain, read_muscles, refuse_substeps
 from xb_muscle_ros.plant.mjcf.calibration import POINTS
 from xb_muscle_ros.plant.mjcf.fibres import build
 from xb_muscle_ros.plant.mjcf.groups import Groups, members_of
@@ -83,6 +83,7 @@ class CrossBridgeMuscles:
         self.fibre_groups = Groups(built.fibres)
         self._place = members_of(muscles.index)
         self.activation: Array = np.zeros(len(self.names))
+        self._time_s = -np.inf
         for line in (*muscles.warnings, *built.warnings):
             warnings.warn(line, DataWarning, stacklevel=2)
         make_plain(model, muscles.index)
@@ -142,6 +143,7 @@ class CrossBridgeMuscles:
         self._refuse_foreign(data)
         calcium = self._each("calcium", calcium_um)
         self._mj.mj_fwdPosition(self._model, data)
+        self._time_s = data.time
         force = self.fibre_groups.settle(self.length_change_l0(data), calcium)
         rows = [self._tables[row] for row in self._table]
         self.activation = np.array([np.interp(c, row, _LEVELS) for c, row in zip(calcium, rows, strict=True)])
@@ -158,10 +160,16 @@ class CrossBridgeMuscles:
             pulls, shape (muscle,), N.
 
         Raises:
-            UserError: a length or calcium that no fibre has; names the muscle.
+            UserError: a length or calcium that no fibre has; names the muscle; or time went back.
             StateViolation: a fibre's state left its bounds.
         """
         calcium = self._each("calcium", calcium_um)
+        if data.time < self._time_s:
+            raise UserError(
+                f"time of data went back from {self._time_s:g} to {data.time:g} s (mj_resetData, or MuJoCo's automatic "
+                "reset after a step that became unstable), but fibres are as they were; settle them by reset"
+            )
+        self._time_s = data.time
         return self._pull(data, self.fibre_groups.advance(self.length_change_l0(data), calcium, self._timestep_s))
 
     def step(self, data: Any, excitation: npt.ArrayLike) -> Array:
@@ -180,6 +188,7 @@ class CrossBridgeMuscles:
             UserError, StateViolation: see `advance`; or an excitation that is not finite.
         """
         self._refuse_foreign(data)
+        refuse_substeps(self._model, self._mj)
         wanted = self._each("excitation", excitation)
         after = self._dynamics.after(self.activation, wanted, self._timestep_s)
         self._mj.mj_step1(self._model, data)

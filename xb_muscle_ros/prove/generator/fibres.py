@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import yaml
 
+from xb_muscle_ros import fast_yaml
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import installed_folders
 
@@ -75,7 +76,7 @@ def _files() -> dict[str, dict[str, dict[str, float]]]:
     if not _found:
         for folder in installed_folders("config", "fibers"):
             for file in sorted(folder.glob("*.yaml")):
-                tree = yaml.safe_load(file.read_text(encoding="utf-8"))
+                tree = fast_yaml.load(file.read_text(encoding="utf-8"))
                 _found.setdefault(file.stem, tree["/**"]["ros__parameters"]["models"])
     if not _found:
         raise UserError("no fibre files are found beside the package; install it whole")

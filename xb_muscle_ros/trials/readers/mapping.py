@@ -12,6 +12,7 @@ from typing import Any
 
 import yaml
 
+from xb_muscle_ros import fast_yaml
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.columns import (
     FILE,
@@ -40,7 +41,7 @@ def load_mapping(path: Path) -> dict[str, Any]:
         UserError: the file is missing, no YAML, or no mapping.
     """
     try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+        tree = fast_yaml.load(path.read_text(encoding="utf-8"))
     except OSError as problem:
         raise UserError(f"mapping {path} cannot be read: {problem.strerror}; give a YAML file") from problem
     except (yaml.YAMLError, UnicodeDecodeError) as problem:
