@@ -72,6 +72,8 @@ class CrossBridgeMuscles:
         muscles = read_muscles(model)
         built = build(self._mj, muscles, choices(table, muscles.names))
         self._model = model
+        # A view, so that what is set later counts; getting it anew at every step costs as much as what it says.
+        self._options, self._several = model.opt, int(self._mj.mjtIntegrator.mjINT_RK4)
         self.names, self.index = muscles.names, muscles.index
         self.f0_n, self.l0_m, self.slack_m = muscles.f0_n, muscles.l0_m, muscles.slack_m
         self.fibres = built.fibres
@@ -163,14 +165,7 @@ class CrossBridgeMuscles:
             UserError: a length or calcium that no fibre has; names the muscle; or time went back.
             StateViolation: a fibre's state left its bounds.
         """
-        calcium = self._each("calcium", calcium_um)
-        if data.time < self._time_s:
-            raise UserError(
-                f"time of data went back from {self._time_s:g} to {data.time:g} s (mj_resetData, or MuJoCo's automatic "
-                "reset after a step that became unstable), but fibres are as they were; settle them by reset"
-            )
-        self._time_s = data.time
-        return self._pull(data, self.fibre_groups.advance(self.length_change_l0(data), calcium, self._timestep_s))
+        return self._advance(data, self._each("calcium", calcium_um), self._timestep_s)
 
     def step(self, data: Any, excitation: npt.ArrayLike) -> Array:
         """One step of model and muscles, in place of `mj_step`.
@@ -188,12 +183,14 @@ class CrossBridgeMuscles:
             UserError, StateViolation: see `advance`; or an excitation that is not finite.
         """
         self._refuse_foreign(data)
-        refuse_substeps(self._model, self._mj)
+        if self._options.integrator == self._several:
+            refuse_substeps(self._model, self._mj)
         wanted = self._each("excitation", excitation)
-        after = self._dynamics.after(self.activation, wanted, self._timestep_s)
+        dt_s = self._timestep_s
+        after = self._dynamics.after(self.activation, wanted, dt_s)
         self._mj.mj_step1(self._model, data)
         acting = self.activation if self._early is None else np.where(self._early, after, self.activation)
-        pull = self.advance(data, self._calcium(acting, _OVERSHOT))
+        pull = self._advance(data, self._calcium(acting, _OVERSHOT), dt_s)
         self._mj.mj_step2(self._model, data)
         self.activation = after
         return pull
@@ -202,9 +199,19 @@ class CrossBridgeMuscles:
         """What all fibres show now, by name of `Outputs`, each of shape (muscle,)."""
         return self.fibre_groups.outputs()
 
+    def _advance(self, data: Any, calcium_um: Array, dt_s: float) -> Array:
+        time_s = data.time
+        if time_s < self._time_s:
+            raise UserError(
+                f"time of data went back from {self._time_s:g} to {time_s:g} s (mj_resetData, or MuJoCo's automatic "
+                "reset after a step that became unstable), but fibres are as they were; settle them by reset"
+            )
+        self._time_s = time_s
+        return self._pull(data, self.fibre_groups.advance(self.length_change_l0(data), calcium_um, dt_s))
+
     @property
     def _timestep_s(self) -> float:
-        return float(self._model.opt.timestep)
+        return float(self._options.timestep)
 
     def _refuse_foreign(self, data: Any) -> None:
         """Refuse what is no MjData of this model: MuJoCo itself would read and write beyond its arrays.
