@@ -243,7 +243,8 @@ def test_a_muscle_node_that_takes_no_more_lengths_ends_the_episode(stage: Stage)
 
         sender = link.node.create_publisher(JointState, "muscle/length", 10)
         assert link.wait_for(lambda: sender.get_subscription_count() > 0, PATIENCE_S)
-        stage.plant("/f", "lockstep", displacement_m=-0.001, episodes=1)
+        # Longer than it takes until the audience is known.
+        stage.plant("/f", "lockstep", displacement_m=-0.001, episodes=1, duration_s=60.0)
         stage.moves_on("/f", 50)
         message = JointState(name=["soleus", "tibialis_anterior"], position=[0.05, 0.1])
         message.header.stamp.sec = 3000

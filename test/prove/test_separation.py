@@ -13,7 +13,7 @@ FORBIDDEN = (
     "mechanisms", "models", "distribution", "stepping", "fit", "replay", "measurement", "evaluate", "scores", "plant",
     "node", "bench",
 )  # fmt: skip
-ALLOWED = ("errors", "files", "progress", "trials", "diagnose.names", "prove.generator")
+ALLOWED = ("errors", "fast_yaml", "files", "progress", "trials", "diagnose.names", "prove.generator")
 FOLDER = Path(generator.__file__).parent
 
 
