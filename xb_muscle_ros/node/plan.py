@@ -1,4 +1,4 @@
-"""A length sample that fibres in lockstep are to be stepped to, and how those are told apart that cannot be."""
+"""A length sample that fibres in lockstep are to be stepped to, and which of them cannot be."""
 
 from __future__ import annotations
 

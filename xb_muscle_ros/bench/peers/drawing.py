@@ -24,7 +24,7 @@ class _Look(NamedTuple):
     dashes: tuple[float, ...]
 
 
-# By the first part of a row's key; told apart by marker, dash and lightness.
+# By the first part of a row's key; distinguished by marker, dash and lightness.
 _LOOKS = {
     "millard": _Look("#c1440e", "s", (4, 1.5)),
     "thelen": _Look("#e9b44c", "D", (2, 1)),

@@ -1,4 +1,4 @@
-"""What a muscle of another package has to be able to do here, and how its rows of the comparison are told apart."""
+"""What a muscle of another package has to be able to do here, and how its rows of the comparison are distinguished."""
 
 from __future__ import annotations
 
