@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import importlib
 import itertools
 import time
 from collections.abc import Callable
@@ -12,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.bench.measure import Figure, Setting
-from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.plant.engine import mujoco, quiet
+from xb_muscle_ros.plant.engine import mujoco, myo_sim, quiet
 from xb_muscle_ros.plant.mjcf.muscles import CrossBridgeMuscles
 
 RIGID, ELASTIC = "rigid tendons", "elastic tendons"
@@ -33,13 +31,7 @@ def leg() -> Any:
     Raises:
         UserError: MuJoCo or myo-sim is not installed; both come with the extra ``body``.
     """
-    mj = mujoco()
-    try:
-        library = importlib.import_module("myo_sim")
-    except ImportError as error:
-        raise UserError(
-            f"MyoLeg cannot be loaded ({error}); install it with pip install 'xb_muscle_ros[body]'"
-        ) from None
+    mj, library = mujoco(), myo_sim()
     with quiet(mj):
         model = library.load_model("myolegs")
     model.opt.timestep = _TICK_S

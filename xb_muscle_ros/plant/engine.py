@@ -25,6 +25,20 @@ def mujoco() -> Any:
         ) from None
 
 
+def myo_sim() -> Any:
+    """The package of the MyoSuite's bodies.
+
+    Raises:
+        UserError: it is not installed.
+    """
+    try:
+        return importlib.import_module("myo_sim")
+    except ImportError as error:
+        raise UserError(
+            f"myo_sim cannot be imported ({error}); install it with pip install 'xb_muscle_ros[body]'"
+        ) from None
+
+
 @contextlib.contextmanager
 def quiet(mj: Any) -> Iterator[None]:
     """Keep MuJoCo's warnings on how a packaged model is put together, also out of a log in the working folder.

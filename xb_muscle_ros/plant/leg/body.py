@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import copy
 import functools
-import importlib
 from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.plant.engine import mujoco, quiet
+from xb_muscle_ros.plant.engine import mujoco, myo_sim, quiet
 from xb_muscle_ros.plant.plant import GRAVITY_M_S2, Array
 
 MODEL = "myolegs"
@@ -30,15 +28,9 @@ def _compiled() -> Any:
     Raises:
         UserError: no MuJoCo, or no myo-sim.
     """
-    mj = mujoco()
-    try:
-        myo_sim = importlib.import_module("myo_sim")
-    except ImportError as error:
-        raise UserError(
-            f"myo_sim cannot be imported ({error}); install it with pip install 'xb_muscle_ros[body]'"
-        ) from None
+    mj, library = mujoco(), myo_sim()
     with quiet(mj):
-        spec = myo_sim.load_spec(MODEL, build_kwargs={"postures": ["standing"]})
+        spec = library.load_spec(MODEL, build_kwargs={"postures": ["standing"]})
         geoms = list(spec.worldbody.geoms)
         floor = next(geom for geom in geoms if geom.type == mj.mjtGeom.mjGEOM_PLANE)
         platform = next(geom for geom in geoms if geom.type == mj.mjtGeom.mjGEOM_CYLINDER and geom.contype)
