@@ -14,7 +14,8 @@ from xb_muscle_ros.trials.readers.units import finite
 from xb_muscle_ros.trials.trial import Phase, TrialFacts
 
 _CONTROL = ("Cc", "Cs", "Zl", "Zp")
-_TEXTS = ("fibre", "trial", "source", "data_set")
+_TEXTS = ("fibre", "trial", "source", "data_set", "protocol")
+_WHERE_KNOWN = ("data_set", "protocol")
 _OPTIONAL_NUMBERS = ("pca", "amplitude_l0", "recovery_s")
 _POSITIVE_NUMBERS = ("reference_length_m", "f0_n")
 
@@ -31,7 +32,7 @@ def facts_to_custom_data(facts: TrialFacts) -> dict[str, str]:
         bad = next((c for c in getattr(facts, name) if unicodedata.category(c) in _CONTROL), None)
         if bad is not None:
             raise UserError(f"{name} holds the control character {bad!r}; allowed is text on one line")
-    data = {name: getattr(facts, name) for name in _TEXTS if name != "data_set" or facts.data_set}
+    data = {name: getattr(facts, name) for name in _TEXTS if name not in _WHERE_KNOWN or getattr(facts, name)}
     for name in _OPTIONAL_NUMBERS + _POSITIVE_NUMBERS:
         value = getattr(facts, name)
         if value is not None:
@@ -39,6 +40,8 @@ def facts_to_custom_data(facts: TrialFacts) -> dict[str, str]:
     data["phases"] = json.dumps(
         [{"name": p.name, "start_s": float(p.start_s), "end_s": float(p.end_s)} for p in facts.phases]
     )
+    if facts.settings:
+        data["settings"] = json.dumps({name: float(value) for name, value in facts.settings})
     return data
 
 
@@ -58,7 +61,21 @@ def facts_from_custom_data(data: Mapping[str, str], where: str, fibre: str, tria
     for name in _POSITIVE_NUMBERS:
         if known.get(name, 1.0) <= 0.0:
             raise UserError(f"bag {where}: custom_data {name} is {known[name]!r}; allowed are numbers above 0")
-    return replace(TrialFacts(fibre, trial, phases=_phases(data.get("phases", "[]"), where)), **known)
+    phases, settings = _phases(data.get("phases", "[]"), where), _settings(data.get("settings", "{}"), where)
+    return replace(TrialFacts(fibre, trial, phases=phases, settings=settings), **known)
+
+
+def _settings(text: str, where: str) -> tuple[tuple[str, float], ...]:
+    try:
+        found = tuple((str(name), float(value)) for name, value in json.loads(text).items())
+    except (ValueError, TypeError, AttributeError) as problem:
+        raise UserError(
+            f"bag {where}: custom_data settings cannot be read ({problem}); needed is a JSON object of numbers"
+        ) from None
+    bad = next((each for each in found if not math.isfinite(each[1])), None)
+    if bad is not None:
+        raise UserError(f"bag {where}: custom_data settings has {bad[0]} = {bad[1]}; allowed are finite numbers")
+    return found
 
 
 def _phases(text: str, where: str) -> tuple[Phase, ...]:

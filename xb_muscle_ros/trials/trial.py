@@ -25,7 +25,8 @@ class Phase:
 
     Attributes:
         name: ``isometric``, ``conditioning_stretch``, ``shortening``, ``recovery``, ``test_stretch`` or ``hold``;
-            records that are not the paper's protocol use ``stretch`` and ``release`` (a quick shortening) as well.
+            records that are not the paper's protocol use ``stretch`` and ``release`` (a quick shortening) as well,
+            and ``clamp`` where force is held in place of length.
         start_s: begin, in the trial's own time, s.
         end_s: end, s; not before ``start_s``.
     """
@@ -50,6 +51,8 @@ class TrialFacts:
         phases: in order of time.
         source: where the data come from, and what was done to them, in words.
         data_set: name of the set of recordings the trial belongs to; empty where there is none.
+        protocol: name of the protocol that made the trial; empty where that is not known.
+        settings: numbers of the protocol for this trial: name with unit, for example ``frequency_hz``, and number.
     """
 
     fibre: str
@@ -62,6 +65,12 @@ class TrialFacts:
     phases: tuple[Phase, ...] = ()
     source: str = ""
     data_set: str = ""
+    protocol: str = ""
+    settings: tuple[tuple[str, float], ...] = ()
+
+    def setting(self, name: str) -> float | None:
+        """A number of the protocol; None where the trial does not tell."""
+        return dict(self.settings).get(name)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,65 @@
+"""A protocol through a model, and through recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.protocols.base import MEASURED, Found, Planned, Protocol, Run, measured
+from xb_muscle_ros.trials.trial import Trial
+
+
+def answers(
+    protocol: Protocol,
+    fibre: Fibre,
+    planned: Sequence[Planned],
+    settle_s: float | None = None,
+    as_measured: bool = False,
+) -> Iterator[Run]:
+    """The planned trials through a model, one after the other.
+
+    Args:
+        as_measured: the force counts as measured.
+
+    Raises:
+        UserError, StateViolation: see `Protocol.answer`.
+    """
+    muscle = Muscle(fibre)
+    for each in planned:
+        yield with_force(protocol.answer(muscle, each, settle_s), fibre, as_measured)
+
+
+def with_force(run: Run, fibre: Fibre, as_measured: bool) -> Run:
+    """A model's run whose trial has the model's force and says whose it is."""
+    assert run.simulated is not None  # a recording has its force
+    source = f"simulated: fibre {fibre.name}, model {fibre.model}, method {fibre.method}"
+    trial = replace(
+        run.trial,
+        facts=replace(run.trial.facts, source=source),
+        force_time_s=run.simulated.time_s,
+        force_n=run.simulated.force_n,
+        force_is_measured=as_measured,
+    )
+    return replace(run, trial=trial)
+
+
+def read_measured(protocol: Protocol, fibre: str, trials: Sequence[Trial]) -> Found:
+    """What recordings of one fibre show; those without force are left out and named in a note."""
+    having = [trial for trial in trials if trial.force_time_s.size]
+    found = protocol.analyse(fibre, MEASURED, [measured(trial) for trial in having])
+    lacking = [trial.facts.trial for trial in trials if not trial.force_time_s.size]
+    notes = [f"trial {name} has no measured force and is left out" for name in lacking]
+    return replace(found, notes=(*notes, *found.notes))
+
+
+def read_model(protocol: Protocol, fibre: Fibre, trials: Sequence[Trial], settle_s: float | None = None) -> Found:
+    """What a model shows that is given what the recorded fibre was given.
+
+    Raises:
+        UserError, StateViolation: see `Protocol.repeat`.
+    """
+    muscle = Muscle(fibre)
+    runs = [protocol.repeat(muscle, trial, settle_s) for trial in trials]
+    return protocol.analyse(trials[0].facts.fibre, fibre.model, runs)
