@@ -16,6 +16,7 @@ _HOMES = {
     "api.fitting": ("FitResult", "fit"),
     "api.inputs": ("read_trials", "write_trials"),
     "api.making": ("make_trial",),
+    "api.protocols": ("ProtocolResult", "analyse_protocol", "run_protocol"),
     "api.replaying": ("ReplayResult", "replay"),
     "api.simulating": ("SimulationResult", "simulate"),
     "errors": ("DataWarning", "StateViolation", "UserError"),

@@ -9,6 +9,9 @@ from xb_muscle_ros.api.fitting import fit as fit
 from xb_muscle_ros.api.inputs import read_trials as read_trials
 from xb_muscle_ros.api.inputs import write_trials as write_trials
 from xb_muscle_ros.api.making import make_trial as make_trial
+from xb_muscle_ros.api.protocols import ProtocolResult as ProtocolResult
+from xb_muscle_ros.api.protocols import analyse_protocol as analyse_protocol
+from xb_muscle_ros.api.protocols import run_protocol as run_protocol
 from xb_muscle_ros.api.replaying import ReplayResult as ReplayResult
 from xb_muscle_ros.api.replaying import replay as replay
 from xb_muscle_ros.api.simulating import SimulationResult as SimulationResult

@@ -155,6 +155,8 @@ def test_ctrl_c_inside_a_compiler_is_an_interruption(
 
     def run(error: type[BaseException]) -> int:
         class Parser:
+            def __init__(self, command: str | None) -> None: ...
+
             def parse_args(self, argv: object) -> object:
                 return self
 

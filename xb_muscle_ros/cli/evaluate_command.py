@@ -25,6 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", nargs="+", help="parameter sets (default: all that the fibre files have)")
     common.add_method(parser)
     common.add_settle(parser)
+    parser.add_argument(
+        "--protocol", metavar="NAME",
+        help="in place of scores: what this protocol shows, of the recordings and of the --model sets (default: none) "
+        "that are given the same; names as for simulate",
+    )  # fmt: skip
     parser.add_argument("--measured-only", action="store_true", help="evaluate the recordings alone, without models")
     parser.add_argument("--skip-bad", action="store_true", help="leave out recordings that cannot be evaluated")
     parser.add_argument(
@@ -38,6 +43,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Evaluate, print the tables, write the files."""
+    return _protocol(arguments) if arguments.protocol is not None else _scores(arguments)
+
+
+def _protocol(arguments: argparse.Namespace) -> int:
+    from xb_muscle_ros.api.protocols import analyse_protocol, check_room
+    from xb_muscle_ros.protocols.registry import protocol_of
+
+    refused = ("measured_only", "skip_bad", "paper", "empirical", "golden", "scheduler", "processes")
+    for name in refused:
+        if getattr(arguments, name) not in (None, False):
+            raise UserError(f"--{name.replace('_', '-')} does not go with --protocol; leave one of them out")
+    check_room(arguments.out, protocol_of(arguments.protocol), (), arguments.overwrite)
+    model = arguments.model or ()
+    found = common.called(
+        analyse_protocol, arguments, trials=arguments.bags, fibre=arguments.fiber, model=model, tell=common.warn
+    )  # fmt: skip
+    print(found)
+    for path in found.save(arguments.out, overwrite=True):
+        print(path)
+    return 0
+
+
+def _scores(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.api.evaluating import evaluate
     from xb_muscle_ros.evaluate.writing import older_results
     from xb_muscle_ros.files import refuse_older

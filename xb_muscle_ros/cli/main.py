@@ -29,25 +29,33 @@ COMMANDS = {
 """Each is a module ``<name>_command`` of this folder: ``DESCRIPTION``, ``add_arguments`` and ``run``."""
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """The whole command line, with the arguments of every command."""
+def build_parser(command: str | None = None) -> argparse.ArgumentParser:
+    """The whole command line.
+
+    Args:
+        command: the arguments of this one alone, which spares the others' imports; else those of every command.
+    """
     made = argparse.ArgumentParser(prog="xb_muscle", description="Cross-bridge muscle: simulate, replay, measure.")
     made.add_argument("--version", action="version", version=f"xb_muscle {__version__}")
     subparsers = made.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, text in COMMANDS.items():
+        if command not in (None, name):
+            subparsers.add_parser(name, help=text)
+            continue
         module = importlib.import_module(f"xb_muscle_ros.cli.{name}_command")
-        command = subparsers.add_parser(
+        parser = subparsers.add_parser(
             name, help=text, description=module.DESCRIPTION, epilog=getattr(module, "EPILOG", None)
         )
-        module.add_arguments(command)
-        command.set_defaults(run=getattr(module, "run", None))
+        module.add_arguments(parser)
+        parser.set_defaults(run=getattr(module, "run", None))
     return made
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit code. What a user can mend is one line on stderr and code 2."""
     try:
-        arguments = build_parser().parse_args(argv)
+        given = sys.argv[1:] if argv is None else argv
+        arguments = build_parser(next((each for each in given if each in COMMANDS), None)).parse_args(argv)
         with warnings.catch_warnings():
             warnings.showwarning = functools.partial(_show, warnings.showwarning)
             return int(arguments.run(arguments))

@@ -1,31 +1,30 @@
-"""``xb_muscle simulate``: the stretch-shorten-stretch protocol through a model, as bags."""
+"""``xb_muscle simulate``: a protocol through a model, as bags, with what is read off them."""
 
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 from xb_muscle_ros.cli import common
 
+if TYPE_CHECKING:
+    from xb_muscle_ros.protocols.base import Option, Protocol
+
 DESCRIPTION = (
-    "Simulate every combination of the given pCa, amplitudes and recovery times of the stretch-shorten-stretch "
-    "protocol; one bag for each."
+    "Simulate every combination of what a protocol is given: one bag for each trial. With --protocol also what is read "
+    "off them: a table as JSON, Markdown and CSV, and a figure."
 )
+EPILOG = "What each protocol does, and what is read off it, stands in docs/protocols.md."
+_DEFAULT = "stretch-shorten-stretch"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command."""
+    from xb_muscle_ros.protocols.registry import PROTOCOLS, all_options
+
     common.add_fibre(parser, required=True)
     common.add_model(parser)
-    parser.add_argument("--pca", type=float, nargs="+", default=[6.1], help="pCa of the bathing solution (default 6.1)")
-    parser.add_argument(
-        "--amplitude", type=float, nargs="+", default=[0.0383], metavar="L0",
-        help="conditioning stretch, L0 (default 0.0383; 0: none)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--recovery", type=float, nargs="+", default=[0.001], metavar="S",
-        help="time between shortening and test stretch, s (default 0.001)",
-    )  # fmt: skip
-    parser.add_argument("--rate", type=float, default=1000.0, metavar="HZ", help="samples per second (default 1000)")
+    parser.add_argument("--protocol", metavar="NAME", help=f"one of {', '.join(PROTOCOLS)} (default {_DEFAULT})")
     common.add_settle(parser)
     parser.add_argument(
         "--as-measured", action="store_true",
@@ -33,29 +32,74 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--prefix", default="simulated", help="begins the names of the bags (default simulated)")
     common.add_out(parser, "folder for the bags", "bags")
+    group = parser.add_argument_group("numbers of the protocols")
+    for name, having in all_options().items():
+        metavar = having[0][1].allowed.unit or name.upper()
+        group.add_argument(
+            f"--{name}", type=float, nargs="+", metavar=metavar.replace("/", "_per_").upper(), help=_help(having)
+        )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate and write, one trial after the other."""
-    from xb_muscle_ros.api import simulating
-    from xb_muscle_ros.files import refuse_older
+    from xb_muscle_ros.api.protocols import ProtocolResult, check_room
+    from xb_muscle_ros.api.simulating import bag_path
     from xb_muscle_ros.progress import Progress
+    from xb_muscle_ros.protocols import report, running
+    from xb_muscle_ros.protocols.base import settings_of
+    from xb_muscle_ros.protocols.registry import all_options, protocol_of
     from xb_muscle_ros.simulation.offline import pushing
+    from xb_muscle_ros.trials.bag_files import remove_results
     from xb_muscle_ros.trials.bags import write_trial
+    from xb_muscle_ros.trials.protocol import ALLOWED
 
-    pca, amplitude, recovery, rate = arguments.pca, arguments.amplitude, arguments.recovery, arguments.rate
-    simulating.check_numbers(pca=pca, amplitude=amplitude, recovery=recovery, rate=rate, settle=arguments.settle)
+    protocol = protocol_of(arguments.protocol or _DEFAULT)
+    given = {name: getattr(arguments, name.replace("-", "_")) for name in all_options()}
+    settings = settings_of(protocol, given)
+    if arguments.settle is not None:
+        ALLOWED["settle_s"].check("--settle", arguments.settle)
     fibre = common.fibre_of(arguments)
-    planned = simulating.protocols(fibre, pca, amplitude, recovery, rate)
-    paths = [simulating.bag_path(arguments.out, arguments.prefix, trial) for _, trial in planned]
-    refuse_older([path for path in paths if path.exists()], arguments.overwrite)
-    made = simulating.simulations(fibre, planned, arguments.settle, arguments.as_measured)
+    planned = protocol.plan(fibre.name, settings)
+    paths = [bag_path(arguments.out, arguments.prefix, each.trial) for each in planned]
+    told = arguments.protocol is not None
+    check_room(arguments.out, protocol if told else None, paths, arguments.overwrite)
+    runs = []
     with Progress(len(planned), "simulate") as progress:
-        for path, (trial, simulated) in zip(paths, made, strict=True):
-            write_trial(path, trial, simulated)
-            if told := pushing(trial, simulated, fibre.model):
-                common.warn(told)
-            low, high = simulated.force_n.min(), simulated.force_n.max()
-            progress.write(f"{path}: {trial.time_s.size} samples, force {low:.3f} to {high:.3f} F0")
+        answers = running.answers(protocol, fibre, planned, arguments.settle, arguments.as_measured)
+        for path, made in zip(paths, answers, strict=True):
+            assert made.simulated is not None  # a model's answer
+            write_trial(path, made.trial, made.simulated)
+            if line := pushing(made.trial, made.simulated, fibre.model):
+                common.warn(line)
+            low, high = made.force_f0.min(), made.force_f0.max()
+            progress.write(f"{path}: {made.time_s.size} samples, force {low:.3f} to {high:.3f} F0")
             progress.update()
+            runs.append(made)
+    if told:
+        found = protocol.analyse(fibre.name, fibre.model, runs)
+        for note in found.notes:
+            common.warn(note)
+        print(ProtocolResult(protocol.name, (found,)))
+        remove_results(report.older_results(arguments.out, protocol))
+        for path in report.write(arguments.out, protocol, [found]):
+            print(path)
     return 0
+
+
+def _help(having: list[tuple[Protocol, Option]]) -> str:
+    """What an option is to each protocol that has it."""
+    told: dict[str, list[tuple[str, str]]] = {}
+    for protocol, option in having:
+        told.setdefault(option.help, []).append((protocol.name, _numbers(option.default)))
+    parts = []
+    for text, of in told.items():
+        by_default: dict[str, list[str]] = {}
+        for name, default in of:
+            by_default.setdefault(default, []).append(name)
+        defaults = "; ".join(f"{', '.join(names)}: {default}" for default, names in by_default.items())
+        parts.append(f"{text} (default of {defaults})")
+    return "; ".join(parts).replace("%", "%%")
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    return " ".join(f"{value:g}" for value in values)
