@@ -169,7 +169,7 @@ def run_protocol(
         >>> import xb_muscle_ros as xb
         >>> found = xb.run_protocol("force-pca", "18Dec2017a", pca=[4.5, 5.5, 6.0, 6.2, 6.4, 7.0])
         >>> round(found.results[0].numbers["pca50"].value, 1)
-        6.2
+        6.1
     """
     chosen = protocol_of(protocol)
     settings = settings_of(chosen, options)
@@ -223,6 +223,9 @@ def analyse_protocol(
     Raises:
         UserError: see `read_trials`; no trial has a measured force; an unknown protocol, fibre or model.
         StateViolation: a state left its bounds.
+
+    Source:
+        docs/protocols.md, with a reference for each.
 
     Examples:
         >>> import xb_muscle_ros as xb

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,14 +14,17 @@ from xb_muscle_ros.api.inputs import FibreLike, fibre_of
 from xb_muscle_ros.api.making import completed, normalised
 from xb_muscle_ros.api.tables import dataframe, drawn
 from xb_muscle_ros.api.telling import Lines, Tell
-from xb_muscle_ros.errors import UserError, naming
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import refuse_older
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.simulation.offline import as_simulated, one_for_all, pushing, simulate_trial
+from xb_muscle_ros.protocols.base import run_of, settings_of
+from xb_muscle_ros.protocols.running import answers, with_force
+from xb_muscle_ros.protocols.stretch_shorten_stretch import StretchShortenStretches
+from xb_muscle_ros.simulation.offline import one_for_all, pushing, simulate_trial
 from xb_muscle_ros.trials.bag_files import plain
 from xb_muscle_ros.trials.bag_writing import write_trial
-from xb_muscle_ros.trials.protocol import ALLOWED, StretchShortenStretch
+from xb_muscle_ros.trials.protocol import ALLOWED
 from xb_muscle_ros.trials.simulated import Simulated
 from xb_muscle_ros.trials.trial import Trial
 
@@ -31,10 +33,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Numbers = float | Sequence[float]
-# Options that are numbers, and what their ranges go by.
-_RANGES = {
-    "pca": "pca", "amplitude": "amplitude_l0", "recovery": "recovery_s", "rate": "rate_hz", "settle": "settle_s",
-}  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -157,60 +155,22 @@ def simulate(
         >>> made.simulated[0].force_n.shape
         (200,)
     """
-    check_numbers(pca=pca, amplitude=amplitude, recovery=recovery, rate=rate, settle=settle)
+    if settle is not None:
+        ALLOWED["settle_s"].check("--settle", settle)
     lines = Lines(tell)
     chosen = fibre_of(fibre, model, method, set, lines)
     if not (time is None and length is None and calcium is None):
         if time is None or length is None or calcium is None:
             raise UserError("time, length and calcium belong together; give all three, or none for the protocol")
         trial, _ = completed(normalised(chosen.name, name, time, length, calcium))
-        found = [_answered(chosen, trial, simulate_trial(Muscle(chosen), trial, 1, settle), as_measured)]
+        runs = iter([with_force(run_of(trial, simulate_trial(Muscle(chosen), trial, 1, settle)), chosen, as_measured)])
     else:
-        planned = protocols(chosen, _several(pca), _several(amplitude), _several(recovery), rate)
-        found = list(simulations(chosen, planned, settle, as_measured))
+        protocol = StretchShortenStretches()
+        settings = settings_of(protocol, {"pca": pca, "amplitude": amplitude, "recovery": recovery, "rate": rate})
+        runs = answers(protocol, chosen, protocol.plan(chosen.name, settings), settle, as_measured)
+    found = [(run.trial, run.simulated) for run in runs if run.simulated is not None]
     lines.say(*one_for_all([line for line in (pushing(t, s, chosen.model) for t, s in found) if line]))
     return SimulationResult(chosen, tuple(t for t, _ in found), tuple(s for _, s in found), tuple(lines))
-
-
-def check_numbers(**options: Numbers | None) -> None:
-    """Check options of a protocol.
-
-    Raises:
-        UserError: one is out of range.
-    """
-    for option, given in options.items():
-        for number in [] if given is None else _several(given):
-            ALLOWED[_RANGES[option]].check(f"--{option}", number)
-
-
-def protocols(
-    fibre: Fibre, pca: Sequence[float], amplitude: Sequence[float], recovery: Sequence[float], rate: float
-) -> list[tuple[StretchShortenStretch, Trial]]:
-    """Every combination as a protocol and its trial without force."""
-    conditions = itertools.product(pca, amplitude, recovery)
-    planned = [(each_pca, StretchShortenStretch(*condition)) for each_pca, *condition in conditions]
-    return [(protocol, protocol.trial(fibre.name, each_pca, rate)) for each_pca, protocol in planned]
-
-
-def simulations(
-    fibre: Fibre,
-    planned: Sequence[tuple[StretchShortenStretch, Trial]],
-    settle: float | None = None,
-    as_measured: bool = False,
-) -> Iterator[tuple[Trial, Simulated]]:
-    """The trials of protocols one after the other, by variable steps from corner to corner: not of the samples.
-
-    Raises:
-        UserError, StateViolation: see `Muscle.settle` and `Muscle.follow`; names the trial.
-    """
-    muscle = Muscle(fibre)
-    for protocol, trial in planned:
-        level = float(trial.calcium_um[0])
-        corner_s, corner_l0 = protocol.corners()
-        with naming(f"trial {trial.facts.trial}"):
-            state = muscle.settle(0.0, level, settle)
-            states = muscle.follow(state, corner_s, corner_l0, 0.0 * corner_s + level, trial.time_s)
-        yield _answered(fibre, trial, as_simulated(trial, trial.time_s, muscle.outputs_of(states)), as_measured)
 
 
 def bag_path(folder: Path, prefix: str, trial: Trial) -> Path:
@@ -245,17 +205,3 @@ def figure_of(trials: Sequence[Trial], simulated: Sequence[Simulated], model: st
     from xb_muscle_ros.replay.figure import draw_replay
 
     return drawn(lambda: draw_replay(Path("replay.png"), trials, simulated, title_of(model)))
-
-
-def _several(given: Numbers) -> list[float]:
-    return [float(number) for number in np.atleast_1d(np.asarray(given, dtype=np.float64))]
-
-
-def _answered(fibre: Fibre, trial: Trial, simulated: Simulated, as_measured: bool) -> tuple[Trial, Simulated]:
-    """The trial with its source and the model's force."""
-    source = f"simulated: fibre {fibre.name}, model {fibre.model}, method {fibre.method}"
-    facts = replace(trial.facts, source=source)
-    answered = replace(
-        trial, facts=facts, force_time_s=trial.time_s, force_n=simulated.force_n, force_is_measured=as_measured
-    )
-    return answered, simulated

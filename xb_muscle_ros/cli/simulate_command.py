@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.protocols import report, running
     from xb_muscle_ros.protocols.base import settings_of
     from xb_muscle_ros.protocols.registry import all_options, protocol_of
-    from xb_muscle_ros.simulation.offline import pushing
+    from xb_muscle_ros.simulation.offline import one_for_all, pushing
     from xb_muscle_ros.trials.bag_files import remove_results
     from xb_muscle_ros.trials.bags import write_trial
     from xb_muscle_ros.trials.protocol import ALLOWED
@@ -63,18 +63,20 @@ def run(arguments: argparse.Namespace) -> int:
     paths = [bag_path(arguments.out, arguments.prefix, each.trial) for each in planned]
     told = arguments.protocol is not None
     check_room(arguments.out, protocol if told else None, paths, arguments.overwrite)
-    runs = []
+    runs, pushed = [], []
     with Progress(len(planned), "simulate") as progress:
         answers = running.answers(protocol, fibre, planned, arguments.settle, arguments.as_measured)
         for path, made in zip(paths, answers, strict=True):
             assert made.simulated is not None  # a model's answer
             write_trial(path, made.trial, made.simulated)
             if line := pushing(made.trial, made.simulated, fibre.model):
-                common.warn(line)
+                pushed.append(line)
             low, high = made.force_f0.min(), made.force_f0.max()
             progress.write(f"{path}: {made.time_s.size} samples, force {low:.3f} to {high:.3f} F0")
             progress.update()
             runs.append(made)
+    for line in one_for_all(pushed):
+        common.warn(line)
     if told:
         found = protocol.analyse(fibre.name, fibre.model, runs)
         for note in found.notes:

@@ -20,6 +20,7 @@ from xb_muscle_ros.evaluate.srs_table import FibreSrs, SrsTable, place
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.plain import fibre_to_plain, muscle_of_plain
+from xb_muscle_ros.protocols.ktr import RAMP_S, RELEASE_L0, SLACK_S
 from xb_muscle_ros.scores.conditions import COMMON_AMPLITUDE_L0
 from xb_muscle_ros.scores.estimate import Estimate, Missing
 from xb_muscle_ros.scores.redevelopment import redevelopment
@@ -30,8 +31,8 @@ from xb_muscle_ros.work.plain import to_plain
 AMPLITUDES_L0 = (0.0, 0.0012, 0.0038, 0.0121, 0.0216, 0.0288, 0.0383, 0.0532, 0.0682)
 RECOVERIES_S = (0.001, 0.01, 0.05, 0.1, 0.2, 0.316, 0.5, 1.0, 3.16, 10.0)
 PCAS = (4.5, 6.1, 6.2, 6.3, 6.4, 6.6, 9.0)
-# Release and restretch as in k_tr recordings of rat soleus: a fifth of the length, for 20 ms.
-_RELEASE_L0, _RELEASE_RAMP_S, _RELEASED_S, _REDEVELOP_S = 0.20, 0.001, 0.020, 5.0
+# Force is followed for this long after release and restretch.
+_REDEVELOP_S = 5.0
 
 Task = dict[str, Any]
 
@@ -132,8 +133,8 @@ def table(label: str, fibres: Sequence[Fibre], made: Sequence[Task], results: Se
 
 
 def _redeveloped(muscle: Muscle, state: Array, calcium: float) -> Estimate:
-    corner_s = np.cumsum([_RELEASE_RAMP_S, _RELEASED_S, _RELEASE_RAMP_S])
-    away = followed(muscle, state, corner_s, np.array([-_RELEASE_L0, -_RELEASE_L0, 0.0]), calcium)[-1]
+    corner_s = np.cumsum([RAMP_S, SLACK_S, RAMP_S])
+    away = followed(muscle, state, corner_s, np.array([-RELEASE_L0, -RELEASE_L0, 0.0]), calcium)[-1]
     time_s = np.arange(1, round(_REDEVELOP_S * 1e3) + 1) * 1e-3
     states = followed(muscle, away, time_s, 0.0 * time_s, calcium)
     force = muscle.outputs_of(states)["force_f0"]

@@ -5,9 +5,19 @@ from __future__ import annotations
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.protocols.base import Option, Protocol
 from xb_muscle_ros.protocols.force_pca import ForcePca
+from xb_muscle_ros.protocols.ktr import RedevelopmentRates
+from xb_muscle_ros.protocols.ramp_hold import RampAndHold
+from xb_muscle_ros.protocols.step import QuickSteps
 from xb_muscle_ros.protocols.stretch_shorten_stretch import StretchShortenStretches
 
-PROTOCOLS: dict[str, Protocol] = {protocol.name: protocol for protocol in (StretchShortenStretches(), ForcePca())}
+_ALL: tuple[Protocol, ...] = (
+    StretchShortenStretches(),
+    RampAndHold(),
+    QuickSteps(),
+    ForcePca(),
+    RedevelopmentRates(),
+)
+PROTOCOLS: dict[str, Protocol] = {protocol.name: protocol for protocol in _ALL}
 
 
 def protocol_of(name: str) -> Protocol:

@@ -1,0 +1,47 @@
+"""Ramp and hold against a force that is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import xb_muscle_ros as xb
+from xb_muscle_ros.protocols.base import settings_of
+from xb_muscle_ros.protocols.registry import PROTOCOLS
+from xb_muscle_ros.trials.trial import Trial
+
+
+def maxwell(amplitude: float, speed: float) -> Trial:
+    """A spring of 2 F0/L0 beside a spring of 30 F0/L0 with a dashpot that relaxes in 50 ms, on a force of 0.5 F0."""
+    protocol = PROTOCOLS["ramp-hold"]
+    (planned,) = protocol.plan("made", settings_of(protocol, {"pca": 6.1, "amplitude": amplitude, "speed": speed}))
+    trial = planned.trial
+    ramp = trial.facts.phases[1]
+    tau, v = 0.05, np.sign(amplitude) * speed
+    on = np.clip(trial.time_s - ramp.start_s, 0.0, ramp.end_s - ramp.start_s)
+    after = np.maximum(trial.time_s - ramp.end_s, 0.0)
+    force = 0.5 + 2.0 * trial.length_change_l0 + 30.0 * v * tau * (1.0 - np.exp(-on / tau)) * np.exp(-after / tau)
+    return replace(trial, force_time_s=trial.time_s, force_n=force)
+
+
+@pytest.mark.parametrize(("amplitude", "speed"), [(0.05, 0.5), (-0.04, 0.2)])
+def test_closed_form(amplitude: float, speed: float) -> None:
+    (found,) = xb.analyse_protocol("ramp-hold", [maxwell(amplitude, speed)], tell=lambda line: None).results
+    (row,) = found.rows
+    lasts_s, tau = abs(amplitude) / speed, 0.05
+    change = 2.0 * amplitude + 30.0 * np.sign(amplitude) * speed * tau * (1.0 - np.exp(-lasts_s / tau))
+    assert row["isometric_f0"].value == pytest.approx(0.5, abs=1e-9)
+    assert row["end_f0"].value == pytest.approx(0.5 + change, abs=0.01 * abs(change))
+    assert row["held_f0"].value == pytest.approx(0.5 + 2.0 * amplitude, abs=1e-6)
+    assert row["relaxed"] == pytest.approx((change - 2.0 * amplitude) / change, rel=0.01)
+    assert row["half_s"] == pytest.approx(tau * np.log(2.0), abs=2e-3)
+    # Over the first 10 ms the dashpot gives a tenth: mean slope of the exponential there.
+    assert row["srs_f0_per_l0"].value == pytest.approx(2.0 + 30.0 * np.exp(-0.1), rel=0.02)
+
+
+def test_a_trial_of_several_ramps_is_a_note() -> None:
+    made = xb.simulate("18Dec2017a", recovery=0.1, as_measured=True)
+    (found,) = xb.analyse_protocol("ramp-hold", made, tell=lambda line: None).results
+    assert any("there is no single stretch or shortening" in note for note in found.notes)

@@ -1,0 +1,138 @@
+"""Rate of force redevelopment (k_tr) after release and restretch (Brenner and Eisenberg 1986), against pCa."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.protocols.base import Cell, Column, Found, Number, Option, Planned, Protocol, Run, Settings
+from xb_muscle_ros.protocols.figures import legend, lettered, looks
+from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
+from xb_muscle_ros.scores.estimate import notes_of
+from xb_muscle_ros.scores.readout import isometric_force
+from xb_muscle_ros.scores.redevelopment import LONGEST_RELEASE_S, SMALLEST_RELEASE_L0, redevelopment_rate, restretch_end
+from xb_muscle_ros.trials.protocol import ALLOWED, Allowed
+
+# As in k_tr recordings of rat soleus: a fifth of the length, for 20 ms.
+RELEASE_L0, RAMP_S, SLACK_S = 0.20, 0.001, 0.020
+_NO_RELEASE = (
+    f"there is no release by {100.0 * SMALLEST_RELEASE_L0:g} % L0 or more that is taken back within "
+    f"{LONGEST_RELEASE_S:g} s"
+)
+# Of redevelopment so many of its time constants are drawn.
+_DRAWN = 5.0
+
+
+class RedevelopmentRates(Protocol):
+    """One release and restretch at each pCa."""
+
+    name = "ktr"
+    title = "release and restretch: rate of force redevelopment (k_tr) against pCa"
+    options = (
+        pca_option(4.5, 5.5, 6.0, 6.1, 6.2, 6.3, 6.4, 6.6),
+        Option("release", (RELEASE_L0,), Allowed(0.05, 0.5, "L0"), "how far it is released, L0", many=False),
+        Option("slack", (SLACK_S,), Allowed(0.001, 0.4, "s"), "time until the restretch, s", many=False),
+        Option("follow", (5.0,), Allowed(0.5, 3600.0, "s"), "time after the restretch, s", many=False),
+        Option("lead", (0.1,), ALLOWED["lead_s"], "isometric time before, s", many=False),
+        rate_option(1000.0),
+    )
+    columns: Mapping[str, Column] = {
+        "trial": Column("trial"),
+        "pca": Column("pCa", form="g"),
+        "isometric_f0": Column("isometric force", "F0", ".3f"),
+        "k_tr_per_s": Column("k_tr", "1/s", ".3f"),
+        "redeveloped": Column("force at the end over that before", "", ".3f"),
+    }
+    numbers: Mapping[str, Column] = {
+        "highest_per_s": Column("largest k_tr", "1/s", ".2f"),
+        "lowest_per_s": Column("smallest k_tr", "1/s", ".2f"),
+    }
+    source = "Brenner and Eisenberg 1986"
+
+    def plan(self, fibre: str, settings: Settings) -> list[Planned]:
+        """One trial for each pCa."""
+        release, slack, follow, lead, rate = (settings[k][0] for k in ("release", "slack", "follow", "lead", "rate"))
+        steps = [
+            ("isometric", lead, 0.0),
+            ("release", RAMP_S, -release),
+            ("hold", slack, 0.0),
+            ("stretch", RAMP_S, release),
+            ("recovery", follow, 0.0),
+        ]
+        return [
+            planned_between(
+                facts_of(
+                    self.name, fibre, f"ktr_pca{10.0 * pca:g}", {"pca": pca, "release_l0": release, "slack_s": slack}
+                ),
+                steps,
+                pca,
+                rate,
+            )
+            for pca in settings["pca"]
+        ]
+
+    def analyse(self, fibre: str, of: str, runs: Sequence[Run]) -> Found:
+        """k_tr of each trial, and how much of the force before comes back while it is followed."""
+        rows: list[Mapping[str, Cell]] = []
+        notes = []
+        for run in runs:
+            facts = run.trial.facts
+            before = isometric_force(run.trial, run.time_s, run.force_f0, run.noise)
+            rate = redevelopment_rate(run.trial, run.time_s, run.force_f0, run.noise)
+            if run.simulated is not None:
+                rate = rate._replace(se=None)  # what an exponential misses is no noise
+            if rate.value is None:
+                notes.append((facts.trial, f"k_tr: {rate.why or _NO_RELEASE}"))
+            last = run.force_f0[run.time_s >= run.time_s[-1] - 0.02 * (run.time_s[-1] - run.time_s[0])]
+            back = float(np.mean(last)) / before.value if rate.value is not None and before.value else None
+            rows.append(
+                {
+                    "trial": facts.trial,
+                    "pca": facts.pca,
+                    "isometric_f0": before,
+                    "k_tr_per_s": rate,
+                    "redeveloped": back,
+                }
+            )
+        found = Found(fibre, of, tuple(rows), runs=tuple(runs), notes=tuple(notes_of(notes)))
+        rates, errors = found.column("k_tr_per_s"), found.errors("k_tr_per_s")
+        if not np.any(np.isfinite(rates)):
+            return found
+        ends = {"highest_per_s": int(np.nanargmax(rates)), "lowest_per_s": int(np.nanargmin(rates))}
+        numbers = {key: _number(rates[i], errors[i]) for key, i in ends.items()}
+        return Found(fibre, of, found.rows, numbers, {}, found.runs, found.notes)
+
+    def draw(self, figure: Any, found: Sequence[Found]) -> None:
+        """Force after the restretch over that before, and k_tr against pCa and against force."""
+        traces, by_pca, by_force = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 1.0))
+        for look, each in looks(found):
+            before = each.column("isometric_f0")
+            for run, force in zip(each.runs, before, strict=True):
+                end_s = restretch_end(run.trial.time_s, run.trial.length_change_l0)
+                if end_s is not None and np.isfinite(force) and force > 0.0:
+                    traces.plot(run.time_s - end_s, run.force_f0 / force, **look.trace)
+            rates, errors = each.column("k_tr_per_s"), each.errors("k_tr_per_s")
+            by_pca.errorbar(each.column("pca"), rates, errors, **look.points, elinewidth=0.8)
+            by_force.errorbar(before, rates, errors, **look.points, elinewidth=0.8)
+        slowest = min((np.nanmin(each.column("k_tr_per_s")) for each in found if each.numbers), default=1.0)
+        traces.set(xlabel="time after the restretch (s)", ylabel="force over that before")
+        traces.set(xlim=(-0.15 * _DRAWN / slowest, _DRAWN / slowest), ylim=(-0.1, 1.4))
+        by_pca.set(xlabel="pCa", ylabel="k$_{tr}$ (1/s)")
+        by_pca.invert_xaxis()
+        by_force.set(xlabel="isometric force (F$_0$)", ylabel="k$_{tr}$ (1/s)", xlim=(0.0, None))
+        for axis in (by_pca, by_force):
+            axis.set_ylim(bottom=0.0)
+        legend(by_pca)
+        lettered([traces, by_pca, by_force])
+
+    def size_mm(self, found: Sequence[Found]) -> tuple[float, float]:
+        """Three axes beside each other."""
+        return 190.0, 70.0
+
+
+def _number(value: float, se: float) -> Number:
+    if not np.isfinite(se):
+        return Number(float(value))
+    return Number(float(value), float(se), float(value - 1.96 * se), float(value + 1.96 * se))
