@@ -9,6 +9,8 @@ from xb_muscle_ros.protocols.ktr import RedevelopmentRates
 from xb_muscle_ros.protocols.ramp_hold import RampAndHold
 from xb_muscle_ros.protocols.step import QuickSteps
 from xb_muscle_ros.protocols.stretch_shorten_stretch import StretchShortenStretches
+from xb_muscle_ros.protocols.tetanus import Tetani
+from xb_muscle_ros.protocols.twitch import Twitches
 
 _ALL: tuple[Protocol, ...] = (
     StretchShortenStretches(),
@@ -16,6 +18,8 @@ _ALL: tuple[Protocol, ...] = (
     QuickSteps(),
     ForcePca(),
     RedevelopmentRates(),
+    Twitches(),
+    Tetani(),
 )
 PROTOCOLS: dict[str, Protocol] = {protocol.name: protocol for protocol in _ALL}
 

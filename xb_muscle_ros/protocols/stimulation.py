@@ -1,0 +1,57 @@
+"""Isometric trials of a stimulated fibre, and when a trial was stimulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from xb_muscle_ros.protocols.base import Planned, Run
+from xb_muscle_ros.protocols.calcium import PulseTransient
+from xb_muscle_ros.protocols.inputs import sample_times
+from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
+
+# Calcium, or without it force, that passes this share of its rise tells when stimulation began.
+_BEGUN = 0.02
+
+
+def stimulated(
+    facts: TrialFacts, transient: PulseTransient, pulses_s: Sequence[float], duration_s: float, rate_hz: float
+) -> Planned:
+    """An isometric trial with calcium that pulses make.
+
+    Calcium holds from sample to sample, so its samples are the middles of the transient's between two of them.
+
+    Args:
+        facts: of the trial; phases are set here.
+        pulses_s: times of the pulses, s.
+
+    Raises:
+        UserError: there would be too many samples.
+    """
+    time_s = sample_times(duration_s, rate_hz, f"protocol {facts.protocol}")
+    phases = (Phase("isometric", 0.0, float(time_s[-1])),)
+    trial = Trial(
+        facts=TrialFacts(facts.fibre, facts.trial, phases=phases, protocol=facts.protocol, settings=facts.settings),
+        time_s=time_s,
+        length_m=np.ones(time_s.size),
+        calcium_time_s=time_s,
+        calcium_um=transient.at(time_s + 0.5 / rate_hz, pulses_s),
+    )
+    return Planned(trial)
+
+
+def begun_s(run: Run) -> tuple[float, str]:
+    """When stimulation began, s, and what tells it."""
+    told = run.setting("first_pulse_s")
+    if told is not None:
+        return told, ""
+    calcium = run.trial.calcium_um
+    if np.ptp(calcium) > 0.05 * np.max(calcium):
+        over = np.flatnonzero(calcium > calcium[0] + _BEGUN * (np.max(calcium) - calcium[0]))
+        if over.size:
+            return float(run.trial.calcium_time_s[over[0]]), "stimulation is taken to begin where calcium rises"
+    rise = run.force_f0 - run.force_f0[0]
+    over = np.flatnonzero(rise > _BEGUN * np.max(rise))
+    begin = int(over[0]) if over.size else 0
+    return float(run.time_s[begin]), "stimulation is taken to begin where force rises by 2 % of its peak"
