@@ -16,20 +16,29 @@ if TYPE_CHECKING:
     from xb_muscle_ros.trials.trial import Trial
 
 # Names of the readers; the readers themselves take time to load.
-FORMATS = ("bag", "csv", "mat", "slc")
+FORMATS = ("bag", "csv", "mat", "slc", "xlsx")
 # option: (key of the mapping and those above it, argument type, help)
 _OPTIONS: dict[str, tuple[str, type, str]] = {
     "--trial": ("trial", str, "name of the trial (default: the file's)"),
     "--trial-column": ("columns.trial.column", str, "column whose value tells the trials of a table apart"),
     "--decimal": ("decimal", str, "'point' or 'comma' (default: what the table shows)"),
+    "--encoding": ("encoding", str, "of a table's text, such as mac_roman (default: what its bytes show)"),
+    "--header": ("header", str, "line of a table that names its columns, or 'none' (default: what the table shows)"),
+    "--sheet": ("sheet", str, "sheet of a workbook (default: all, a trial each)"),
+    "--longest-blank": (
+        "blanks.longest",
+        str,
+        "runs of blank samples of a table up to this are filled (default: '2 ms')",
+    ),
     "--fiber": ("fibre", str, "name of the fibre"),
     "--data-set": ("data_set", str, "begins the names of the bags (default: the fibre)"),
     "--source": ("source", str, "where the data come from, in words"),
-    "--time-column": ("columns.time.column", str, "column of time"),
-    "--rate": ("columns.time.rate", str, "samples in a second where there is no column of time: '1000 Hz'"),
-    "--time-unit": ("columns.time.unit", str, "unit of time"),
+    "--time-column": ("columns.time.column", str, "column of time, by its name or number"),
+    "--rate": ("columns.time.rate", str, "samples in a second where no column tells the time: '1000 Hz'"),
+    "--time-unit": ("columns.time.unit", str, "unit of time (default: what the table's header tells)"),
     "--length-column": ("columns.length.column", str, "column of length"),
-    "--length-unit": ("columns.length.unit", str, "unit of length"),
+    "--length-pattern": ("columns.length.pattern", str, "columns of length, one a trial: 'L_pCa(?P<pca>.+)'"),
+    "--length-unit": ("columns.length.unit", str, "unit of length (default: what the table's header tells)"),
     "--length-is": ("columns.length.is", str, "'absolute' length (default) or 'change' from the reference length"),
     "--length-of": ("columns.length.of", str, "length of the 'fibre' (default), a 'sarcomere' or a 'half_sarcomere'"),
     "--reference-length": (
@@ -38,7 +47,8 @@ _OPTIONS: dict[str, tuple[str, type, str]] = {
         "the length that is L0, for example '42.8 mm', or 'first_isometric' (default)",
     ),
     "--force-column": ("columns.force.column", str, "column of measured force or stress"),
-    "--force-unit": ("columns.force.unit", str, "unit of force or stress"),
+    "--force-pattern": ("columns.force.pattern", str, "columns of force, one a trial: 'F_pCa(?P<pca>.+)'"),
+    "--force-unit": ("columns.force.unit", str, "unit of force or stress (default: what the table's header tells)"),
     "--f0": ("f0", str, "the force or stress that is F0, for example '97 kPa'"),
     "--calcium-column": ("columns.calcium.column", str, "column of free calcium"),
     "--calcium-unit": ("columns.calcium.unit", str, "unit of calcium, or pCa"),

@@ -110,7 +110,9 @@ def test_f0_is_the_force_of_its_pca_wherever_that_stands(tmp_path: Path, first: 
 def test_forces_side_by_side_are_told(tmp_path: Path) -> None:
     file = table(tmp_path / "a.csv", pca=None, **{"f_pCa45": np.zeros(3 * N), "f_pCa6.1": np.zeros(3 * N)})
     told = imported(run(file, pca=6.1))[0].trial.warnings
-    assert any("not read, because of another pCa by name: 'f_pCa45'; import" in warning for warning in told)
+    assert any(
+        "not read, because of another pCa by name: 'f_pCa45'; a pattern in the mapping" in warning for warning in told
+    )
     (event, *_) = imported(run(file, {"force": {"column": "f_pCa45", "unit": "mN"}}, pca=6.1, trial="b"))
     assert any("force column is 'f_pCa45', but pCa is given as 6.1" in warning for warning in event.trial.warnings)
 

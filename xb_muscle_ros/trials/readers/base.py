@@ -13,6 +13,7 @@ import numpy as np
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.columns import FILE
 from xb_muscle_ros.trials.readers.description import ImportMapping
+from xb_muscle_ros.trials.readers.left_out import Told
 from xb_muscle_ros.trials.trial import Array
 
 _BEGIN_BYTES = 4096
@@ -151,6 +152,7 @@ class Reader(abc.ABC):
         begins: what such files begin with, where that tells them.
         kind: how a mapping names signals, `columns.FILE` or `columns.BAG`.
         defaults: what a mapping need not say for this format; a tree as a mapping file has it.
+        takes: keys of `options.TABLE_KEYS` that it knows; those with any read tables.
     """
 
     name: str
@@ -158,6 +160,7 @@ class Reader(abc.ABC):
     begins: tuple[bytes, ...] = ()
     kind: str = FILE
     defaults: Mapping[str, Any] = {}
+    takes: tuple[str, ...] = ()
 
     def matches(self, path: Path) -> bool:
         """Whether a file or folder is of this format, as far as its begin and its name tell."""
@@ -170,6 +173,14 @@ class Reader(abc.ABC):
         Raises:
             UserError: the file cannot be read at all.
         """
+
+    def told(self, path: Path, tree: Mapping[str, Any]) -> Told:
+        """What a file tells of what a mapping, given as a tree, leaves out.
+
+        Raises:
+            UserError: the file cannot be read, or does not tell it.
+        """
+        return Told()
 
     def pca(self, path: Path, mapping: ImportMapping) -> float | None:
         """The pCa of the trial in a file, read at little cost; None where it has none or holds several trials.

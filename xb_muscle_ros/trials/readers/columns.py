@@ -6,8 +6,9 @@ import math
 
 from xb_muscle_ros.errors import UserError, naming
 from xb_muscle_ros.trials.activation import CalciumTransient
-from xb_muscle_ros.trials.readers.description import Activation, Column, Stimulation
-from xb_muscle_ros.trials.readers.tree import Keys
+from xb_muscle_ros.trials.readers.description import FACTS, Activation, Column, Stimulation
+from xb_muscle_ros.trials.readers.side_by_side import TRIAL
+from xb_muscle_ros.trials.readers.tree import Keys, check_keys
 from xb_muscle_ros.trials.readers.units import Unit, quantity, unit_of
 
 FILE = "file"
@@ -46,17 +47,40 @@ def read_column(columns: Keys, key: str, kind: str) -> Column:
     place = _PLACE[kind][0]
     if key == "time" and kind == BAG:
         return Column(columns.below(key, "stamp", "largest_step").choice("stamp", "header", "log"), "s", _SECONDS)
-    keys = columns.below(key, *_PLACE[kind], "unit", *SIGNALS[key])
+    by_pattern = ("pattern", "factors") if kind == FILE else ()
+    keys = columns.below(key, *_PLACE[kind], *by_pattern, "unit", *SIGNALS[key])
     if key == "time" and "rate" in keys:
-        if "column" in keys:
+        if "column" in keys or "pattern" in keys:
             raise UserError(
                 f"{keys.where}: columns.time has a column and a rate; the column tells the times, leave one out"
             )
         return Column(f"time at {keys.values['rate']}", "s", _SECONDS)
+    if "pattern" in keys:
+        return _by_pattern(keys, key)
     name = keys.text(place, f"name the {place}")
     field = keys.text("field", f"name the field of {name}, for example position[0]") if kind == BAG else ""
     unit_name = keys.text("unit", f"give the unit of {place} '{name}'")
     return Column(name, unit_name, unit_of(unit_name, key, keys.where), field)
+
+
+def _by_pattern(keys: Keys, key: str) -> Column:
+    """A signal with a column for each trial."""
+    if "column" in keys:
+        raise UserError(f"{keys.where}: {keys.path} has a column and a pattern; leave one out")
+    pattern = keys.pattern("pattern", "give a regular expression of column names")
+    groups = tuple(pattern.groupindex)
+    check_keys(groups, (TRIAL, *FACTS), f"group in {keys.path}.pattern: ", keys.where)
+    if not groups:
+        raise UserError(
+            f"{keys.where}: {keys.path}.pattern is '{pattern.pattern}', which has no named group; needed is one that "
+            "tells trials apart, for example 'F_(?P<trial>.+)' or 'F_pCa(?P<pca>.+)'"
+        )
+    factors = keys.below("factors")
+    check_keys(factors.values, [name for name in groups if name in FACTS], f"{keys.path}.factors.", keys.where)
+    unit_name = keys.text("unit", f"give the unit of the columns '{pattern.pattern}'")
+    unit = unit_of(unit_name, key, keys.where)
+    numbers = {name: factors.number(name) for name in factors.values}
+    return Column(pattern.pattern, unit_name, unit, pattern=pattern, factors=numbers)
 
 
 def optional_column(columns: Keys, key: str, kind: str) -> Column | None:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.activation import CalciumTransient
+from xb_muscle_ros.trials.readers.options import DEFAULTS, TableOptions
 from xb_muscle_ros.trials.readers.units import Quantity, Unit, finite
 
 # What a length may be the length of, the first by default.
@@ -18,16 +19,25 @@ LENGTHS_OF = ("fibre", "half_sarcomere", "sarcomere")
 FIRST_ISOMETRIC = "first_isometric"
 FACTS = ("pca", "amplitude_l0", "recovery_s")
 # Endings of files that tell a format and are no part of a name.
-ENDINGS = (".csv", ".tsv", ".txt", ".dat", ".asc", ".mat", ".slc", ".mcap", ".db3")
+ENDINGS = (
+    *(".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
+    *(".mat", ".slc", ".mcap", ".db3"),
+)
 
 
 class Column(NamedTuple):
-    """Where the numbers of a signal are, a column, a channel or a field of a topic's messages, and their unit."""
+    """Where the numbers of a signal are, a column, a channel or a field of a topic's messages, and their unit.
+
+    With a ``pattern`` they are in a column for each trial, whose whole name it matches; ``name`` is then the pattern's
+    text, and numbers that its groups find are multiplied with ``factors``.
+    """
 
     name: str
     unit_name: str
     unit: Unit
     field: str = ""
+    pattern: re.Pattern[str] | None = None
+    factors: Mapping[str, float] = {}
 
 
 class Stimulation(NamedTuple):
@@ -69,7 +79,8 @@ class ImportMapping:
         activation: makes calcium of stimulation.
         trial: name of the trial, with ``{file}`` and ``{folder}`` as in ``fibre``.
         trial_column: a column of a table whose value tells its trials apart; None for one called so, if any.
-        decimal: decimal mark of a table, `table.POINT` or `table.COMMA`; None for what its cells show.
+        table: how a table is read.
+        told: lines on what was taken from the file because the mapping leaves it out.
         rate_hz: samples in a second, where there is no column of time.
         length_is_change: the length column holds the change from the reference length.
         length_of: what the length column is the length of, one of `LENGTHS_OF`; lengths of sarcomeres and halves of
@@ -101,7 +112,8 @@ class ImportMapping:
     activation: Activation | None = None
     trial: str = "{file}"
     trial_column: str | None = None
-    decimal: str | None = None
+    table: TableOptions = DEFAULTS
+    told: tuple[str, ...] = ()
     rate_hz: float | None = None
     length_is_change: bool = False
     length_of: str = "fibre"
@@ -126,6 +138,13 @@ class ImportMapping:
         told = {"time": self.time, "length": self.length, "force": self.force, "calcium": self.calcium}
         return {name: column for name, column in {**told, "stimulation": stimulation}.items() if column is not None}
 
+    @property
+    def patterns(self) -> tuple[re.Pattern[str], ...]:
+        """Patterns whose groups tell facts: of the names of files, sheets and columns."""
+        sheets = None if self.table.sheets is None else self.table.sheets.pattern
+        found = (self.file_name, sheets, *(column.pattern for column in self.columns.values()))
+        return tuple(pattern for pattern in found if pattern is not None)
+
     def facts_of(self, path: Path) -> dict[str, float | None]:
         """pCa, amplitude (L0) and recovery (s) of one file; what its name tells goes before what holds for all.
 
@@ -142,9 +161,17 @@ class ImportMapping:
                 )
             for name, text in match.groupdict().items():
                 if text is not None:
-                    # 12 digits, so that 61 tenths are 6.1
-                    facts[name] = float(f"{finite(text, name, str(path)) * self.factors.get(name, 1.0):.12g}")
+                    facts[name] = fact_of(text, self.factors.get(name, 1.0), name, str(path))
         return facts
+
+
+def fact_of(text: str, factor: float, name: str, where: str) -> float:
+    """A fact that a name tells, to 12 digits, so that 61 tenths are 6.1.
+
+    Raises:
+        UserError: it is no finite number.
+    """
+    return float(f"{finite(text, name, where) * factor:.12g}")
 
 
 def name_of(path: Path) -> str:

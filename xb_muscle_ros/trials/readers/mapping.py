@@ -5,6 +5,7 @@ Every key is checked; one that is not known is answered with the nearest that is
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -24,7 +25,7 @@ from xb_muscle_ros.trials.readers.columns import (
     trial_column,
 )
 from xb_muscle_ros.trials.readers.description import FACTS, FIRST_ISOMETRIC, LENGTHS_OF, ImportMapping
-from xb_muscle_ros.trials.readers.table import DECIMALS
+from xb_muscle_ros.trials.readers.options import TABLE_KEYS, read_options
 from xb_muscle_ros.trials.readers.tree import Keys, check_keys
 from xb_muscle_ros.trials.readers.units import finite
 
@@ -61,7 +62,7 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
     Raises:
         UserError: an unknown or missing key, an unknown unit, or a value that is not allowed.
     """
-    keys = Keys(tree, where, known=(*_NAMES, "decimal", *_PARTS, *FACTS))
+    keys = Keys(tree, where, known=(*_NAMES, *TABLE_KEYS, *_PARTS, *FACTS))
     fibre = keys.text("fibre", "name the fibre, for example 'fibre: 18Dec2017a' or --fiber 18Dec2017a")
     columns = keys.below("columns", *SIGNALS, "trial")
     time, length = read_column(columns, "time", kind), read_column(columns, "length", kind)
@@ -83,7 +84,7 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
         activation=read_activation(keys),
         trial=_name(keys, "trial", "{file}"),
         trial_column=trial_column(columns, kind),
-        decimal=keys.choice("decimal", *DECIMALS) if "decimal" in keys else None,
+        table=read_options(keys, FACTS),
         rate_hz=columns.below("time").amount("rate", "rate", "1000 Hz"),
         length_is_change=length_keys.choice("is", "absolute", "change") == "change",
         length_of=length_keys.choice("of", *LENGTHS_OF),
@@ -100,7 +101,8 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
         isometric_fractions=_fractions(scaling),
         isometric_source=scaling.line("source"),
     )
-    for fault in (*_length_faults(made), *_force_faults(made), *_calcium_faults(made)):
+    faults = (_length_faults, _force_faults, _calcium_faults, _pattern_faults)
+    for fault in itertools.chain.from_iterable(each(made) for each in faults):
         raise UserError(f"{where}: {fault}")
     return made
 
@@ -163,9 +165,26 @@ def _calcium_faults(made: ImportMapping) -> Iterator[str]:
         yield f"columns.stimulation and activation.begin: {what} when there is stimulation; exactly one has to"
     if activation.begin_s is not None and activation.end_s is None and made.force is None:
         yield "activation.end is force_drop, but there is no force column; give the time it ends"
-    by_name = made.file_name is not None and "pca" in made.file_name.groupindex
+    by_name = any("pca" in pattern.groupindex for pattern in made.patterns)
     if made.calcium is not None or "pca" in made.facts or by_name:
         yield "calcium comes from stimulation, so a calcium column and pCa have no use; leave them out"
+
+
+def _pattern_faults(made: ImportMapping) -> Iterator[str]:
+    """Facts that both the names of columns and something else tell."""
+    columns = {key: column for key, column in made.columns.items() if column.pattern is not None}
+    for key, column in columns.items():
+        assert column.pattern is not None
+        twice = next((fact for fact in column.pattern.groupindex if fact in made.facts), None)
+        if twice is not None:
+            yield f"columns.{key}.pattern tells {twice}, and it is given as well; leave one of them out"
+        if "pca" in column.pattern.groupindex and made.calcium is not None:
+            yield f"columns.{key}.pattern tells pca, and columns.calcium tells calcium; leave one of them out"
+    sheets = made.table.sheets
+    if sheets is not None and sheets.pattern is not None:
+        twice = next((fact for fact in sheets.pattern.groupindex if fact in made.facts), None)
+        if twice is not None:
+            yield f"sheet.pattern tells {twice}, and it is given as well; leave one of them out"
 
 
 def _file_name(keys: Keys) -> tuple[re.Pattern[str] | None, Mapping[str, float]]:

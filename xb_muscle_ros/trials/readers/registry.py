@@ -10,9 +10,11 @@ from xb_muscle_ros.trials.readers.base import Reader
 from xb_muscle_ros.trials.readers.csv import CsvReader
 from xb_muscle_ros.trials.readers.mat import MatReader
 from xb_muscle_ros.trials.readers.slc import SlcReader
+from xb_muscle_ros.trials.readers.xlsx import XlsxReader
 
 # In the order they are asked: text that is none of the others is a table.
-READERS: dict[str, Reader] = {reader.name: reader for reader in (BagReader(), MatReader(), SlcReader(), CsvReader())}
+_ALL = (BagReader(), MatReader(), SlcReader(), XlsxReader(), CsvReader())
+READERS: dict[str, Reader] = {reader.name: reader for reader in _ALL}
 
 
 def reader_for(path: Path, name: str | None = None) -> Reader:

@@ -17,7 +17,9 @@ from xb_muscle_ros.trials.readers.assembly import trial_of
 from xb_muscle_ros.trials.readers.base import Reader
 from xb_muscle_ros.trials.readers.description import ImportMapping, name_of
 from xb_muscle_ros.trials.readers.force import Force, isometric_force
+from xb_muscle_ros.trials.readers.left_out import Told, is_left_out
 from xb_muscle_ros.trials.readers.mapping import build_mapping
+from xb_muscle_ros.trials.readers.options import TABLE_KEYS
 from xb_muscle_ros.trials.readers.registry import READERS, reader_for
 from xb_muscle_ros.trials.readers.tree import Keys, merged
 from xb_muscle_ros.trials.readers.units import Quantity
@@ -71,10 +73,13 @@ class ImportSettings:
         self._cases = _cases(rest.pop("per_file", []), where)
         self._tree, self._where, self._overrides = rest, where, overrides or {}
         self.isometric_scaling = isometric_scaling
+        self._merged = functools.lru_cache(_KEPT)(self._merge)
         self._mapping = functools.lru_cache(_KEPT)(self._built)
         self._isometric_f0 = functools.lru_cache(_KEPT)(isometric_f0)
         if not self._cases and self._format is not None:
-            self._mapping(READERS[self._format], ())
+            reader = READERS[self._format]
+            if not reader.takes or not is_left_out(self._merged(reader, ())):  # else the file may tell it
+                self._mapping(reader, (), Told())
 
     def prepare(self, path: Path) -> Prepared:
         """What a file needs to be read.
@@ -85,7 +90,8 @@ class ImportSettings:
         """
         reader = reader_for(path, self._format)
         matching = tuple(i for i, (files, _) in enumerate(self._cases) if files.search(name_of(path)))
-        mapping, digest = self._mapping(reader, matching)
+        told = reader.told(path, self._merged(reader, matching))
+        mapping, digest = self._mapping(reader, matching, told)
         if mapping.f0_at_pca is None:
             return Prepared(path, reader, mapping, digest)
         suffix = path.suffix.lower()
@@ -99,25 +105,33 @@ class ImportSettings:
         digest = hashlib.sha256(f"{digest} {f0.value!r} {note}".encode()).hexdigest()
         return Prepared(path, reader, replace(mapping, f0=f0, f0_note=note), digest)
 
-    def _built(self, reader: Reader, matching: tuple[int, ...]) -> tuple[ImportMapping, str]:
-        """The mapping of files of a format that some of the cases match, and its digest."""
+    def _merge(self, reader: Reader, matching: tuple[int, ...]) -> Mapping[str, Any]:
+        """Keys that hold for files of a format that some of the cases match."""
         trees = (self._tree, *(self._cases[i][1] for i in matching), self._overrides)
-        tree = functools.reduce(merged, trees, dict(reader.defaults))
+        return functools.reduce(merged, trees, dict(reader.defaults))
+
+    def _built(self, reader: Reader, matching: tuple[int, ...], found: Told) -> tuple[ImportMapping, str]:
+        """The mapping of such files, with what they tell themselves, and its digest."""
+        tree = merged(found.tree, self._merged(reader, matching))
         told = json.dumps([VERSION, reader.name, self.isometric_scaling, _with_text_keys(tree)], sort_keys=True)
         try:
             made = build_mapping(tree, self._where, reader.kind)
-            _check_format(made, reader)
+            _check_format(made, tree, reader)
         except UserError as problem:
             raise MappingError(str(problem)) from None
-        return made, hashlib.sha256(told.encode()).hexdigest()
+        return replace(made, told=found.lines), hashlib.sha256(told.encode()).hexdigest()
 
 
-def _check_format(made: ImportMapping, reader: Reader) -> None:
-    """What only tables have."""
-    told = {"columns.trial": made.trial_column, "decimal": made.decimal, "columns.time.rate": made.rate_hz}
-    unused = next((key for key, value in told.items() if value is not None), None)
-    if unused is not None and reader.name != "csv":
-        raise UserError(f"{made.where}: {unused} is for tables (csv), the file is {reader.name}; leave it out")
+def _check_format(made: ImportMapping, tree: Mapping[str, Any], reader: Reader) -> None:
+    """What only tables have, or only some of them."""
+    told: dict[str, object] = {"columns.trial": made.trial_column, "columns.time.rate": made.rate_hz}
+    told |= {f"columns.{key}.pattern": column.pattern for key, column in made.columns.items()}
+    unused = [key for key, value in told.items() if value is not None and not reader.takes]
+    unused += [key for key in TABLE_KEYS if key in tree and key not in reader.takes]
+    if unused:
+        takers = [other for other in READERS.values() if other.takes]
+        names = ", ".join(each.name for each in takers if unused[0] not in TABLE_KEYS or unused[0] in each.takes)
+        raise UserError(f"{made.where}: {unused[0]} is for tables ({names}), the file is {reader.name}; leave it out")
 
 
 def _with_text_keys(tree: object) -> object:

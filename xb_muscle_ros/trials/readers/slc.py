@@ -18,8 +18,8 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal
+from xb_muscle_ros.trials.readers.cells import number
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled, name_of
-from xb_muscle_ros.trials.readers.table import number
 from xb_muscle_ros.trials.trial import Array
 
 MAGIC = b"SLCONTROL_DATA_FILE"

@@ -1,93 +1,98 @@
-"""Tables of numbers in delimited text, whatever its encoding; every complaint names the row and the column.
-
-Text is UTF-8, UTF-16 as Excel's "Unicode text", or Windows-1252. A header line names the columns.
-"""
+"""A table: columns of numbers by name; every complaint names the row and the column."""
 
 from __future__ import annotations
 
-import codecs
-import csv
-import math
-import re
-import unicodedata
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError, suggest
+from xb_muscle_ros.trials.readers.cells import (
+    COMMA,
+    POINT,
+    Cell,
+    clock_seconds,
+    is_blank,
+    is_clock,
+    is_grouped,
+    number,
+    with_comma,
+    with_point,
+)
+from xb_muscle_ros.trials.readers.layout import plain
+from xb_muscle_ros.trials.readers.rows import Rows
 from xb_muscle_ros.trials.trial import Array
 
-POINT, COMMA = "point", "comma"
-DECIMALS = (POINT, COMMA)
-_WITH_COMMA = re.compile(r"[+-]?(\d*,\d+|\d+,)([eE][+-]?\d+)?")
-_WITH_POINT = re.compile(r"[+-]?(\d*\.\d+|\d+\.)([eE][+-]?\d+)?")
-# 1,234 may be a little more than one, or more than a thousand.
-_EITHER = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
-_GROUPED = re.compile(r"[+-]?[1-9]\d{0,2}(?P<mark>[ '.,\u00a0\u2009\u202f\u2019])\d{3}(?:(?P=mark)\d{3})*(?:[.,]\d+)?")
-_DELIMITERS = "\t;,"
-# Excel tells itself the delimiter in a line before the header.
-_SEPARATOR_LINE = re.compile(r"sep=(.)", re.IGNORECASE)
-_BEGINS = {
-    codecs.BOM_UTF8: "utf-8-sig",
-    codecs.BOM_UTF16_LE: "utf-16",
-    codecs.BOM_UTF16_BE: "utf-16",
-}
-
-
-def with_comma(cells: Iterable[tuple[int, str]], sure: bool = False) -> tuple[int, str] | None:
-    """The first number with a comma, and its line; with `sure`, one whose comma is no mark of thousands."""
-    return next((c for c in cells if _WITH_COMMA.fullmatch(c[1]) and not (sure and _EITHER.fullmatch(c[1]))), None)
-
-
-def with_point(cells: Iterable[tuple[int, str]]) -> tuple[int, str] | None:
-    """The first number with a decimal point, and its line."""
-    return next((cell for cell in cells if _WITH_POINT.fullmatch(cell[1])), None)
-
-
-def number(text: str, decimal: str = POINT) -> float:
-    """The number a cell holds; nan where it holds none, or one with marks of thousands."""
-    if "_" in text:  # Python's own way to write thousands
-        return math.nan
-    text = text.replace("\u2212", "-")
-    if decimal == COMMA and "," in text:
-        if not _WITH_COMMA.fullmatch(text):
-            return math.nan
-        text = text.replace(",", ".")
-    elif decimal == COMMA and "." in text:
-        return math.nan
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
-
-
-def is_grouped(text: str) -> bool:
-    """Whether a cell that is no number is one with marks of thousands."""
-    return _GROUPED.fullmatch(text) is not None
+Places = npt.NDArray[np.bool_]
+Indices = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table as text: ``header`` names the columns, ``rows`` pairs line numbers (from 1) with cells.
+    """A table as it stands in a file.
 
     Attributes:
-        header: names of the columns, none twice.
-        rows: line number and cells of each row.
-        decimal: `POINT` or `COMMA`.
-        notices: what was found of encoding and decimal mark, one line each.
+        path: the file.
+        header: names of the columns; numbers from 1 where the table has none.
+        rows: what is below.
+        decimal: `cells.POINT` or `cells.COMMA`.
+        notices: what was found of encoding, header and decimal mark, one line each.
+        units: what is told of the unit of each column; empty where nothing is.
+        starts: first rows of blocks, each a trial; the first is 0.
+        rate: samples in a second and where that is told, where it is and is the same for all blocks.
+        sheet: the sheet of a workbook.
+        name: what names of its trials have of the table's own; empty where the file has no other.
     """
 
     path: Path
     header: tuple[str, ...]
-    rows: tuple[tuple[int, tuple[str, ...]], ...]
+    rows: Rows
     decimal: str = POINT
     notices: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    starts: tuple[int, ...] = (0,)
+    rate: tuple[float, str] | None = None
+    sheet: str = ""
+    name: str = ""
 
-    def line(self, row: int) -> int:
-        """Line number in the file (from 1) of a row (from 0)."""
-        return self.rows[row][0]
+    @property
+    def where(self) -> str:
+        """The table, for messages."""
+        return f"{self.path}, sheet '{self.sheet}'" if self.sheet else str(self.path)
+
+    def place(self, row: int) -> str:
+        """A row (from 0), for messages, by its number in the file (from 1)."""
+        return f"{self.rows.word} {self.rows.number(row)}"
+
+    def called(self, name: str, lines: Iterable[str]) -> Table:
+        """The same with a name of its own, and with lines on other tables of the file."""
+        return replace(self, name=name, notices=(*lines, *self.notices))
+
+    def index(self, column: str) -> int:
+        """Place of a column, by its name or else by its number from 1.
+
+        Raises:
+            UserError: no such column, or several.
+        """
+        wanted = plain(column)
+        found = [i for i, name in enumerate(self.header) if plain(name) == wanted]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            numbers = " or ".join(str(i + 1) for i in found)
+            raise UserError(
+                f"{self.where} has more than one column '{column}'; rename one, or give its number: {numbers}"
+            )
+        if wanted.isdecimal() and 1 <= int(wanted) <= len(self.header):
+            return int(wanted) - 1
+        hint = suggest(column, self.header)
+        raise UserError(
+            f"{self.where} has no column '{column}'; its columns: {', '.join(self.header)}"
+            f"{hint if 'did you mean' in hint else ''}"
+        )
 
     def texts(self, column: str) -> list[str]:
         """Cells of a column without blanks around them.
@@ -95,8 +100,7 @@ class Table:
         Raises:
             UserError: no such column.
         """
-        index = self._index(column)
-        return [cells[index].strip() if index < len(cells) else "" for _, cells in self.rows]
+        return [cell if isinstance(cell, str) else f"{cell:.12g}" for cell in self._cells(self.index(column))]
 
     def numbers(self, column: str) -> Array:
         """Values of a column, shape (rows,).
@@ -104,168 +108,133 @@ class Table:
         Raises:
             UserError: no such column, or a cell that is missing or no finite number.
         """
-        texts = self.texts(column)
-        values: Array = np.array([number(text, self.decimal) for text in texts])
-        bad = ~np.isfinite(values)
-        if bad.any():
-            self._refuse(column, texts, bad)
+        values, blank = self.samples(column)
+        if blank.any():
+            self.refuse(column, blank)
         return values
 
-    def _index(self, column: str) -> int:
-        wanted = _plain(column)
-        for i, name in enumerate(self.header):
-            if _plain(name) == wanted:
-                return i
-        hint = suggest(column, self.header)
-        raise UserError(
-            f"{self.path} has no column '{column}'; its columns: {', '.join(self.header)}"
-            f"{hint if 'did you mean' in hint else ''}"
-        )
+    def samples(self, column: str, ragged: bool = False) -> tuple[Array, Places]:
+        """Values of a column, not finite where a cell is blank, and where that is; shape (rows,) each.
 
-    def _refuse(self, column: str, texts: list[str], bad: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> None:
+        Args:
+            ragged: cells that are missing, because a row is short, are blank.
+
+        Raises:
+            UserError: no such column, or a cell that is neither blank nor a finite number.
+        """
+        values = self._values(self.index(column))
+        bad = ~np.isfinite(values)
+        blank = bad & np.isnan(values)
+        if blank.any() and self.rows.matrix(self.decimal) is None:
+            place, rows = self.index(column), self.rows.cells
+            cells = [next(iter(rows[i][place:]), "" if ragged else None) for i in np.flatnonzero(blank)]
+            blank[blank] = [cell is not None and is_blank(cell) for cell in cells]
+        if not np.array_equal(bad, blank):
+            self.refuse(column, bad)
+        return values, blank
+
+    def times(self, column: str, rows: Indices) -> tuple[Array, bool]:
+        """Values of a column of time in some rows, and whether they are s because its cells are times of a clock.
+
+        Raises:
+            UserError: as for `numbers`, or a date that cannot be read.
+        """
+        if self.has_clock(column):
+            return self._clock(column, rows), True
+        values, blank = self.samples(column)
+        missing = np.zeros_like(blank)
+        missing[rows] = blank[rows]
+        if missing.any():
+            self.refuse(column, missing)
+        return values[rows], False
+
+    def has_clock(self, column: str) -> bool:
+        """Whether the first cell of a column is the time of a clock."""
+        place = self.index(column)
+        return self.rows.matrix(self.decimal) is None and is_clock(next(iter(self.rows.cells[0][place:]), ""))
+
+    def refuse(self, column: str, bad: Places, allowed: str = "") -> None:
+        """Refuse a column.
+
+        Args:
+            bad: the cells at fault.
+            allowed: what would allow them.
+
+        Raises:
+            UserError: always, naming the first of them.
+        """
+        texts = self.texts(column)
         first = int(np.argmax(bad))
         run = int(np.argmin(bad[first:])) or bad.size - first
         text = texts[first]
-        more = f" (a run of {run} lines)" if run > 1 else ""
+        more = f" (a run of {run} {self.rows.word}s)" if run > 1 else ""
         if int(bad.sum()) > run:
-            more += f"; so do {int(bad.sum()) - run} further lines"
-        remedy = "needed is a finite number; mend or remove the line"
-        if run > 1 and not text:
-            remedy = "needed is a finite number; remove these lines, or fill them in where the signal is known"
+            more += f"; so do {int(bad.sum()) - run} further {self.rows.word}s"
+        remedy = f"needed is a finite number; mend or remove the {self.rows.word}"
+        if allowed:
+            remedy = f"needed is a finite number; {allowed}"
+        elif run > 1 and not text:
+            remedy = f"needed is a finite number; remove these {self.rows.word}s, or fill them in where the signal is "
+            remedy += "known"
         elif is_grouped(text):
             remedy = "thousands separators are not read; export the numbers without them"
         elif "," in text and self.decimal == POINT:
             remedy = "if that is a decimal comma, give --decimal comma; else mend or remove the line"
         found = f"'{text}'" if text else "nothing"
-        raise UserError(f"{self.path}, line {self.line(first)}, column '{column}' holds {found}{more}; {remedy}")
+        raise UserError(f"{self.where}, {self.place(first)}, column '{column}' holds {found}{more}; {remedy}")
+
+    def _clock(self, column: str, rows: Indices) -> Array:
+        everything = self._cells(self.index(column))
+        cells = [everything[row] for row in rows]
+        seconds = clock_seconds(cells)
+        if seconds is not None:
+            return seconds
+        wrong = next((row for row, cell in zip(rows.tolist(), cells, strict=True) if not is_clock(cell)), None)
+        if wrong is None:
+            raise UserError(
+                f"{self.where}, column '{column}': dates change and are not written as 2026-11-30; write them so, or "
+                "leave the column out and give the rate of the samples (--rate '1000 Hz')"
+            )
+        found = f"'{everything[wrong]}'" if str(everything[wrong]) else "nothing"
+        raise UserError(
+            f"{self.where}, {self.place(wrong)}, column '{column}' holds {found}; needed is the time of a clock such "
+            f"as '{cells[0]}'; mend or remove the {self.rows.word}"
+        )
+
+    def _cells(self, index: int) -> list[Cell]:
+        rows = [cells[index] if index < len(cells) else "" for cells in self.rows.cells]
+        return [cell.strip() if isinstance(cell, str) else cell for cell in rows]
+
+    def _values(self, index: int) -> Array:
+        matrix = self.rows.matrix(self.decimal)
+        if matrix is None:
+            return np.array([number(cell, self.decimal) for cell in self._cells(index)])
+        return matrix[:, index] if index < matrix.shape[1] else np.full(len(self.rows), np.nan)
 
 
-def read_table(path: Path, decimal: str | None = None) -> Table:
-    """Read delimited text: comma, semicolon or tab, told by the header line; lines that begin with # are comments.
-
-    Args:
-        decimal: `POINT` or `COMMA`; None for what the cells show.
+def decimal_of(where: str, rows: Rows) -> tuple[str, str]:
+    """The decimal mark that cells show, and a line on it where it is the comma.
 
     Raises:
-        UserError: the file is missing, no text, has no header line or no rows, has rows that are longer than the
-            header, or its decimal mark cannot be told.
+        UserError: both marks occur, or every comma may be one of thousands.
     """
-    if path.is_dir():
-        raise UserError(f"{path} is a folder; give the files themselves, for example {path}/*.csv")
-    text, encoding = read_text(path)
-    lines = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
-    separator = _SEPARATOR_LINE.fullmatch(lines[0][1].strip()) if lines else None
-    if separator is not None:
-        lines = lines[1:]
-    if not lines:
-        raise UserError(f"{path} is empty; needed are a header line and rows of numbers")
-    delimiter = separator.group(1) if separator is not None else max(_DELIMITERS, key=lines[0][1].count)
-    try:
-        cells = [next(csv.reader([line], delimiter=delimiter)) for _, line in lines]
-    except csv.Error as problem:
-        raise UserError(f"{path} is no delimited text ({problem}); export the recording as CSV or TSV") from problem
-    header = tuple(name.strip() for name in cells[0])
-    _check_header(path, lines[0][0], header)
-    if len(cells) < 2:
-        raise UserError(f"{path} has a header line but no rows; needed are rows of numbers")
-    rows = tuple((line, tuple(row)) for (line, _), row in zip(lines[1:], cells[1:], strict=True))
-    _check_lengths(path, header, rows)
-    mark, notice = (decimal, "") if decimal is not None else _decimal(path, rows)
-    return Table(path, header, rows, mark, tuple(line for line in (encoding, notice) if line))
-
-
-def _check_header(path: Path, line: int, header: tuple[str, ...]) -> None:
-    if all(np.isfinite(number(name)) or np.isfinite(number(name, COMMA)) for name in header):
-        raise UserError(f"{path}, line {line} holds numbers; needed is a header line that names the columns")
-    plain = [_plain(name) for name in header]
-    twice = next((name for name in header if name and plain.count(_plain(name)) > 1), None)
-    if twice is not None:
-        raise UserError(f"{path} has more than one column '{twice}'; rename one")
-
-
-def _check_lengths(path: Path, header: tuple[str, ...], rows: tuple[tuple[int, tuple[str, ...]], ...]) -> None:
-    """Cells beyond the header have shifted others: decimal commas between commas, say."""
-    for line, cells in rows:
-        if any(cell.strip() for cell in cells[len(header) :]):
-            raise UserError(
-                f"{path}, line {line} has {len(cells)} cells, the header {len(header)}; decimal commas need another "
-                "delimiter (semicolon or tab), and every column a name; export it again"
-            )
-
-
-def _decimal(path: Path, rows: tuple[tuple[int, tuple[str, ...]], ...]) -> tuple[str, str]:
-    """The decimal mark the cells show, and a line on it where it is the comma."""
-    comma = with_comma(cell for cell in _cells(rows) if "," in cell[1])
+    if rows.matrix(POINT) is not None:
+        return POINT, ""
+    comma = with_comma(rows.holding(","))
     if comma is None:
         return POINT, ""
-    point = with_point(_cells(rows))
+    point = with_point(rows.holding("."))
     if point is not None:
         raise UserError(
-            f"{path}, line {comma[0]} holds '{comma[1]}', line {point[0]} '{point[1]}': decimal commas and points in "
-            "one file; tell which mark is that of decimals by --decimal comma or --decimal point"
+            f"{where}, {rows.word} {comma[0]} holds '{comma[1]}', {rows.word} {point[0]} '{point[1]}': decimal commas "
+            "and points in one file; tell which mark is that of decimals by --decimal comma or --decimal point"
         )
-    sure = with_comma(_cells(rows), sure=True)
+    sure = with_comma(rows.holding(","), sure=True)
     line, text = sure or comma
     if sure is None:
         raise UserError(
-            f"{path}, line {line} holds '{text}', which is {text.replace(',', '.')} or {text.replace(',', '')}; tell "
-            "which by --decimal comma, or export the numbers without thousands separators"
+            f"{where}, {rows.word} {line} holds '{text}', which is {text.replace(',', '.')} or "
+            f"{text.replace(',', '')}; tell which by --decimal comma, or export the numbers without "
+            "thousands separators"
         )
-    return COMMA, f"{path} has decimal commas: '{text}' in line {line} is read as {text.replace(',', '.')}"
-
-
-def _cells(rows: tuple[tuple[int, tuple[str, ...]], ...]) -> Iterator[tuple[int, str]]:
-    return ((line, cell.strip()) for line, cells in rows for cell in cells)
-
-
-def _plain(name: str) -> str:
-    """A column's name as it is compared: the two signs for micro are one."""
-    return unicodedata.normalize("NFKC", name).strip()
-
-
-def looks_like_text(begin: bytes) -> bool:
-    """Whether the first bytes of a file may be text."""
-    return bool(begin) and (_encoding(begin) is not None or b"\x00" not in begin)
-
-
-def read_text(path: Path) -> tuple[str, str]:
-    """Read a text file; a line on its encoding, where that is not UTF-8, comes with the text.
-
-    Raises:
-        UserError: it cannot be read, or is no text.
-    """
-    try:
-        data = path.read_bytes()
-    except OSError as problem:
-        raise UserError(f"{path} cannot be read: {problem.strerror}; give a CSV or TSV file") from problem
-    encoding = _encoding(data)
-    notice = "" if encoding in (None, "utf-8-sig") else f"{path} is UTF-16 text and read as such"
-    try:
-        text = data.decode(encoding or "utf-8")
-    except UnicodeDecodeError as problem:
-        if encoding is not None:
-            raise UserError(f"{path} is no whole {encoding} text ({problem.reason}); export it again") from None
-        if b"\x00" in data:
-            raise UserError(f"{path} is no text; export the recording as CSV or TSV") from None
-        try:
-            text, name = data.decode("cp1252"), "Windows-1252 (cp1252)"
-        except UnicodeDecodeError:
-            text, name = data.decode("latin-1"), "Latin-1"
-        line = data[: problem.start].count(b"\n") + 1
-        notice = f"{path}, line {line} is no UTF-8; the file is read as {name}"
-    if "\x00" in text:
-        raise UserError(f"{path} is no text; export the recording as CSV or TSV")
-    return text, notice
-
-
-def _encoding(data: bytes) -> str | None:
-    """Encoding by the mark at the begin; UTF-16 without its mark has zero in every other byte of plain numbers."""
-    marked = next((name for mark, name in _BEGINS.items() if data.startswith(mark)), None)
-    if marked is not None:
-        return marked
-    pairs = data[:512]
-    half = len(pairs) // 2
-    for name, zeros, others in (("utf-16-le", pairs[1::2], pairs[::2]), ("utf-16-be", pairs[::2], pairs[1::2])):
-        if half >= 2 and zeros.count(0) >= 0.9 * half and not others.count(0):
-            return name
-    return None
+    return COMMA, f"{where} has decimal commas: '{text}' in {rows.word} {line} is read as {text.replace(',', '.')}"

@@ -46,6 +46,22 @@ KINDS = {
     "stimulation": ("stimulation",),
 }
 
+# Other spellings, as headers have them.
+_SPELLINGS = {
+    **dict.fromkeys(("sec", "secs", "second", "seconds", "Sec", "Seconds"), "s"),
+    **dict.fromkeys(("msec", "millisecond", "milliseconds"), "ms"),
+    **dict.fromkeys(("usec", "microsecond", "microseconds"), "us"),
+    **dict.fromkeys(("micron", "microns", "micrometer", "micrometre"), "um"),
+    **dict.fromkeys(("mN/mm^2", "mN mm-2", "mN*mm^-2", "kN/m2", "kN/m^2", "kpa", "KPa"), "kPa"),
+    **dict.fromkeys(("N/mm2", "N/mm^2"), "MPa"),
+    **dict.fromkeys(("N/cm^2",), "N/cm2"),
+    **dict.fromkeys(("F/F0", "Fo"), "F0"),
+    **dict.fromkeys(("L/L0", "Lo"), "L0"),
+    **dict.fromkeys(("pca", "-log[Ca]"), "pCa"),
+}
+_BRACKETED = re.compile(r"[(\[{<]\s*([^()\[\]{}<>]+?)\s*[)\]}>]\s*$")
+_BEHIND = re.compile(r"[\w)][_ ,/;]+\s*([^\W\d_][^\s_,;]*|%\w+)$")
+
 
 def finite(value: object, key: str, where: str) -> float:
     """A number.
@@ -68,13 +84,31 @@ def unit_of(text: str, column: str, where: str) -> Unit:
     Raises:
         UserError: unknown unit, or one of something else.
     """
-    name = text.replace("µ", "u").replace("μ", "u").replace("²", "2")
+    name = _simple(text)
     allowed = [known for known, unit in UNITS.items() if unit.kind in KINDS[column]]
     if name not in UNITS:
         raise UserError(f"{where}: unit '{text}' of {column} is not known{suggest(name, allowed)}")
     if name not in allowed:
         raise UserError(f"{where}: '{text}' is no unit of {column}; allowed: {', '.join(allowed)}")
     return UNITS[name]
+
+
+def unit_in(text: str, column: str) -> str | None:
+    """The name of the unit that text in a file stands for, where it is one of the column's; None where not."""
+    name = _simple(text.strip().strip("()[]{}<>").strip())
+    name = _SPELLINGS.get(name, name)
+    return name if name != "1" and name in UNITS and UNITS[name].kind in KINDS[column] else None
+
+
+def header_unit(name: str) -> str:
+    """What a column's name has of a unit: ``Force (mN)``, ``Length [mm]``, ``Force_mN``, ``Time, s``; empty if none."""
+    match = _BRACKETED.search(name) or _BEHIND.search(name)
+    found = match.group(1) if match else name if name == "pCa" else ""
+    return found if any(unit_in(found, signal) for signal in KINDS) else ""
+
+
+def _simple(text: str) -> str:
+    return text.replace("µ", "u").replace("μ", "u").replace("²", "2")
 
 
 def quantity(text: str, column: str, what: str, where: str, example: str = "42.8 mm", zero: bool = False) -> Quantity:

@@ -1,0 +1,63 @@
+"""Columns of a table that hold, or are named after, another pCa than a trial is given."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.readers.calcium import PCA_COLUMN, SAME_PCA
+from xb_muscle_ros.trials.readers.cells import number
+from xb_muscle_ros.trials.readers.description import ImportMapping
+from xb_muscle_ros.trials.readers.parts import Part
+from xb_muscle_ros.trials.readers.table import Table
+
+_PCA_IN_NAME = re.compile(r"p[ _-]?ca[ _=:-]*(\d+(?:[.,]\d+)?)", re.IGNORECASE)
+
+
+def check_pca(table: Table, mapping: ImportMapping, part: Part, pca: float | None) -> Iterator[str]:
+    """Warnings on columns of a given pCa, after making sure that no column tells another than the trial is given.
+
+    Raises:
+        UserError: a column of pCa that is not read holds another.
+    """
+    if mapping.calcium is not None or mapping.activation is not None or pca is None:
+        return
+    force = part.columns.get("force", "")
+    patterns = [column.pattern for column in mapping.columns.values() if column.pattern is not None]
+    others = []
+    for name in table.header:
+        if PCA_COLUMN.match(name):
+            _check_column(table, name, part, pca)
+        found = _PCA_IN_NAME.search(name)
+        if found is None:
+            continue
+        stated = float(found.group(1).replace(",", "."))
+        stated = stated / 10.0 if stated > 12.0 else stated  # 61 is 6.1
+        if abs(stated - pca) > SAME_PCA and name == force:
+            yield f"{table.where}: the force column is '{name}', but pCa is given as {pca:g}; check both"
+        elif abs(stated - pca) > SAME_PCA and not any(pattern.fullmatch(name) for pattern in patterns):
+            others.append(f"'{name}'")
+    if others:
+        yield (
+            f"{table.where}: not read, because of another pCa by name: {', '.join(others)}; a pattern in the mapping "
+            "reads them all (columns.force.pattern), or import the file again for each, with its --force-column, --pca "
+            "and --trial"
+        )
+
+
+def _check_column(table: Table, name: str, part: Part, pca: float) -> None:
+    texts = table.texts(name)
+    values = np.array([number(texts[row], table.decimal) for row in part.rows])
+    with np.errstate(invalid="ignore"):
+        if not np.all((values >= 1.0) & (values <= 12.0)):
+            return  # no pCa
+    other = np.flatnonzero(np.abs(values - pca) > SAME_PCA)
+    if other.size:
+        row = int(part.rows[other[0]])
+        raise UserError(
+            f"{table.where}, {table.place(row)}, column '{name}' holds {texts[row]}, but pCa is given as {pca:g} "
+            f"for the whole trial; read the column with --calcium-column '{name}' --calcium-unit pCa"
+        )
