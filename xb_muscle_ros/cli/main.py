@@ -16,7 +16,8 @@ from xb_muscle_ros.errors import DataWarning, UserError
 COMMANDS = {
     "demo": "replay the recordings of fibre 18Dec2017a offline and through the node",
     "import": "make bags of recordings in CSV, MATLAB, SLControl or other bags",
-    "simulate": "simulate stretch-shorten-stretch trials into bags",
+    "record": "record live topics into a bag",
+    "simulate": "simulate trials of a protocol into bags, and read them off",
     "replay": "replay bags through the model and compare forces",
     "evaluate": "score models against recordings, and set them beside the paper",
     "fit": "estimate a fibre's parameters from recordings",
