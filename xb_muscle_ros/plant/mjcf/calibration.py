@@ -10,6 +10,7 @@ from scipy.interpolate import PchipInterpolator
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.models.passive import without_own
 from xb_muscle_ros.models.registry import SEPARATOR, with_mechanisms
 from xb_muscle_ros.plant.mjcf.table import Choice
 from xb_muscle_ros.plant.plant import Array
@@ -62,8 +63,7 @@ def calibrated(choice: Choice, where: str) -> Calibration:
         fibre = load_fibre(choice.fibre, bare, choice.method, values=choice.parameters)
     except UserError as error:
         raise UserError(f"{where}: {error}") from error
-    none = {name: 0.0 for name in ("kpe", "Fpe0") if name in fibre.values}
-    fibre = changed(fibre, {**none, **choice.parameters}, where)
+    fibre = changed(fibre, {**without_own(fibre.values), **choice.parameters}, where)
     muscle = Muscle(fibre)
 
     def force(calcium_um: float) -> float:
