@@ -11,15 +11,26 @@ class UserError(Exception):
     """Something the user can mend; the command line prints it on one line and exits with code 2.
 
     The message names the file, fibre, parameter, state or time at fault, the value found, what is allowed, and
-    what to do. Line breaks are folded away, because logs and terminals are read line by line.
+    what to do. It is made one printable line, because logs and terminals are read line by line.
     """
 
     def __init__(self, message: str) -> None:
-        super().__init__(" ".join(message.split()))
+        super().__init__(one_line(message))
 
 
 class DataWarning(UserWarning):
     """Something was guessed, left out or taken for granted; one line that names it."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
+
+
+def one_line(text: str) -> str:
+    """A text with line breaks folded away; what cannot be printed (a name's NUL, an escape) is shown by its code."""
+    folded = " ".join(text.split())
+    if folded.isprintable():
+        return folded
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in folded)
 
 
 class StateViolation(UserError):

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
+import os
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -55,3 +60,38 @@ def test_joints_and_places_of_a_moment(new_domain: Callable[[], int]) -> None:
         at, turn = lower.transform.translation, lower.transform.rotation
         assert (at.x, at.y, at.z) == tuple(data.xpos[2])
         assert (turn.w, turn.x, turn.y, turn.z) == tuple(data.xquat[2])
+
+
+@pytest.mark.slow
+def test_places_go_out_on_tf(new_domain: Callable[[], int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Over DDS with a package tf2_msgs, ROS' or a stand-in, and read by another reader of its public definition."""
+    from rosbags.typesys import Stores, get_typestore
+
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    import tf_stand_in
+
+    own: dict[str, str] = {}
+    if importlib.util.find_spec("tf2_msgs") is None:
+        if not tf_stand_in.can_be_made():
+            pytest.skip("needs tf2_msgs, or ROS' generators and a compiler")
+        own = tf_stand_in.make(tmp_path / "tf2_msgs")
+    root = Path(__file__).resolve().parents[2]
+    before = {"PYTHONPATH": f"{root}:{os.environ.get('PYTHONPATH', '')}"}
+    merged = {name: f"{path}:{before.get(name, os.environ.get(name, ''))}" for name, path in own.items()}
+    command = [sys.executable, str(Path(__file__).with_name("tf_listener.py")), str(new_domain()), TWO_LINKS, "0.7"]
+    environment = {**os.environ, **before, **merged}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "tf is not published" not in done.stderr
+    data = bytes.fromhex(done.stdout.split()[-1])
+    read = get_typestore(Stores.ROS2_JAZZY).deserialize_cdr(data, "tf2_msgs/msg/TFMessage")
+    model = mujoco.MjModel.from_xml_string(TWO_LINKS)
+    at = mujoco.MjData(model)
+    at.qpos[0] = 0.7
+    mujoco.mj_forward(model, at)
+    assert [made.child_frame_id for made in read.transforms] == ["leg/upper", "leg/lower", "leg/loose"]
+    for k, made in enumerate(read.transforms, 1):
+        place, turn = made.transform.translation, made.transform.rotation
+        assert (made.header.frame_id, made.header.stamp.sec, made.header.stamp.nanosec) == ("world", 1, 500_000_000)
+        assert [place.x, place.y, place.z] == at.xpos[k].tolist()
+        assert [turn.w, turn.x, turn.y, turn.z] == at.xquat[k].tolist()

@@ -11,6 +11,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.files import refuse_older
 from xb_muscle_ros.models.catalogue import without_effect_line
 from xb_muscle_ros.models.fibre_file import Fibre, borrowed_line, changed, load_fibre
+from xb_muscle_ros.models.passive import passive_twice_line
 from xb_muscle_ros.models.strain_bins import wide_bins_line
 from xb_muscle_ros.trials.bag_files import plain
 from xb_muscle_ros.trials.bag_writing import write_trial
@@ -48,6 +49,7 @@ def fibre_of(
     lines.say(borrowed_line(found))
     if not for_fit:  # a fit says these of the values that it ends with
         lines.say(without_effect_line(found.model, found.values), wide_bins_line(found.values))
+        lines.say(passive_twice_line(found.values))
     return found
 
 

@@ -62,6 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _run_joint(arguments: argparse.Namespace) -> int:
     """The scenes of one joint."""
     from xb_muscle_ros.files import matching, refuse_older
+    from xb_muscle_ros.models.passive import passive_twice_line
     from xb_muscle_ros.plant.figure import draw_loop
     from xb_muscle_ros.plant.loop import DURATION_S, Muscles, in_process, run_ankle, run_knee
     from xb_muscle_ros.plant.plant import Plant
@@ -101,6 +102,10 @@ def _run_joint(arguments: argparse.Namespace) -> int:
 
         muscles = over_ros()
     if scene == "ankle":
+        # The knee's fibre has no parallel element of its own.
+        for fibre in filter(None, fibres):
+            if said := passive_twice_line(fibre.values):
+                common.warn(f"{fibre.model}: {said}")
         settings["platform"] = vars(platform)
         runs = [
             functools.partial(run_ankle, fibre, platform, duration, elastic, muscles, each)

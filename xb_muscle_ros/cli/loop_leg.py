@@ -23,7 +23,8 @@ MODELS = ("3state_coop_slack", "hill_se_slack", "hill", "mujoco")
 """Whose series elements do not push: muscles of a leg go slack."""
 _SWAY_PERCENT, _SWAY_HZ = (0.0, 1.0, 3.0), (0.5, 1.0)
 _AIM = {"lead": "lead_m", "knee": "knee_rad", "tone": "tone"}
-_OWN = ("lead", "knee", "tone", "sway", "sway_hz", "node_parameters")
+_OWN = ("lead", "knee", "tone", "sway", "sway_hz", "csv_step", "node_parameters")
+_CSV_STEP_S = 0.005
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,6 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--sway-hz", type=float, action="append", metavar="HZ",
         help="its frequency (may be given again; default 0.5 and 1)",
+    )  # fmt: skip
+    group.add_argument(
+        "--csv-step", type=float, metavar="S",
+        help="time from one row of loop.csv to the next, s (default 0.005; 0.001: every tick)",
     )  # fmt: skip
     group.add_argument(
         "--node-parameters", type=Path, metavar="FILE",
@@ -65,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.files import matching, refuse_older
     from xb_muscle_ros.plant.leg.body import Body
     from xb_muscle_ros.plant.leg.figure import draw_leg
-    from xb_muscle_ros.plant.leg.report import ended, tables, write
+    from xb_muscle_ros.plant.leg.report import beyond_lengths, ended, tables, write
     from xb_muscle_ros.plant.leg.stance import Aim, find_stance
     from xb_muscle_ros.plant.leg.study import count, run_model, sways
     from xb_muscle_ros.plant.reflex import NO_REFLEX, ReflexArc
@@ -88,6 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
     reflex = loop_reflex.reflex_of(arguments)
     pairs = [(fibre, each) for fibre in fibres for each in ((NO_REFLEX, reflex) if reflex.works else (NO_REFLEX,))]
     body = Body()
+    every = _every(arguments.csv_step, body.tick_s)
     # What does not fit is told before anything takes time.
     ReflexArc(reflex, body.muscles, body.tick_s)
     stance = find_stance(body, aim)
@@ -103,7 +109,7 @@ def run(arguments: argparse.Namespace) -> int:
                 common.warn(f"{error}; that model is left out")
     if not runs:
         raise UserError("none of the models can stand so; see the warnings, or give --lead, --knee or --tone")
-    for line in ended(runs):
+    for line in [*ended(runs), *(f"{one.model}, {line}" for one in runs for line in beyond_lengths(one)[:1])]:
         common.warn(line)
     print(tables(runs))
     settings: dict[str, object] = {
@@ -116,9 +122,21 @@ def run(arguments: argparse.Namespace) -> int:
         **({"reflex": vars(reflex)} if reflex.works else {}),
     }
     draw_leg(arguments.out / "loop.png", runs)
-    for path in [*write(arguments.out, body, stance, runs, settings), arguments.out / "loop.png"]:
+    for path in [*write(arguments.out, body, stance, runs, settings, every), arguments.out / "loop.png"]:
         print(path)
     return 0
+
+
+def _every(step_s: float | None, tick_s: float) -> int:
+    """Ticks from one row of ``loop.csv`` to the next.
+
+    Raises:
+        UserError: not a whole number of them.
+    """
+    wanted = _CSV_STEP_S if step_s is None else step_s
+    if not tick_s <= wanted <= 1.0 or abs(wanted / tick_s - round(wanted / tick_s)) > 1e-6:
+        raise UserError(f"--csv-step is {wanted:g} s; allowed are whole ticks of {tick_s:g} s, up to 1 s")
+    return round(wanted / tick_s)
 
 
 def _write_node_parameters(arguments: argparse.Namespace) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -45,6 +46,9 @@ def fibres_of(name: str, models: Sequence[str] | None, defaults: Sequence[str]) 
     from xb_muscle_ros.plant.drives import OWN
 
     fibres: list[Fibre | None] = []
+    for model, count in Counter(models or ()).items():
+        if count > 1:
+            common.warn(f"--model {model} is given {count} times; it runs once")
     load_fibre(name)  # a fibre that is not there is an error, not a model to leave out
     for model in dict.fromkeys(models or defaults):
         if model == OWN:

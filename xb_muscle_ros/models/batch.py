@@ -70,6 +70,10 @@ class MuscleBatch:
         """Number of fibres."""
         return len(self.muscles)
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickled and copied by its fibres; the copy has scratch of its own, compiled code is found anew."""
+        return type(self), ([muscle.fibre for muscle in self.muscles],)
+
     def warm(self) -> None:
         """Take a step of 1 µs from rest, so that the first real one finds everything compiled (seconds once)."""
         states = np.stack([muscle.rest() for muscle in self.muscles])

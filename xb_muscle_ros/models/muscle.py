@@ -20,17 +20,13 @@ Array = npt.NDArray[np.float64]
 
 # The fixed stepper's guard: an embedded error of 1e-4 is 0.02 % of F0; smooth input at 1 ms stays 100 times below it.
 GUARD = 1e-4
-# Rows of scratch: four for the loops, the others for a model's step.
-SCRATCH_ROWS = 14
+SCRATCH_ROWS = 14  # four for the loops, the others for a model's step
 _LONGEST_SETTLING_S = 1e6
-# Embedded error of the steps on the way to rest.
-_ON_THE_WAY = 1e-4
+_ON_THE_WAY = 1e-4  # embedded error of the steps on the way to rest
 
-# Compiled modules that have taken a step in this process.
-_WARM: set[Any] = set()
+_WARM: set[Any] = set()  # compiled modules that have taken a step in this process
 
-# Remedies by result code of the compiled loops.
-_REMEDIES = (
+_REMEDIES = (  # by result code of the compiled loops
     "",
     "check the input for jumps and the parameters for extremes, or take a smaller step",
     "check the parameters, or take a smaller step",
@@ -80,6 +76,10 @@ class Muscle:
             # One short step now, so that the first real one finds everything compiled.
             self.outputs(self.step(self.rest(), 0.0, 0.1, 1e-6))
             _WARM.add(self.code)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickled and copied by its fibre; compiled code is found anew."""
+        return type(self), (self.fibre,)
 
     @property
     def state_names(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.plant.drives import FibreDrive, beyond, without_parallel
 from xb_muscle_ros.plant.junction import Junction
 from xb_muscle_ros.plant.plant import Architecture, Array, Plant
-from xb_muscle_ros.plant.reflex import NO_REFLEX, Reflex
+from xb_muscle_ros.plant.reflex import NO_REFLEX, Reflex, levels_by_tick
 from xb_muscle_ros.plant.translation import RampAndHold
 
 
@@ -136,8 +136,7 @@ class Body:
     @property
     def calcium(self) -> Sequence[tuple[int, Array]]:
         """See `MovedBody`; without a reflex one value for good."""
-        coming = () if self._reflex is None else self._reflex.coming
-        return [*enumerate((self._calcium_um, *coming), max(self.tick - 1, 0))]
+        return levels_by_tick(self._calcium_um, self._reflex, self.tick)
 
     @property
     def over(self) -> str:

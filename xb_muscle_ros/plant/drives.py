@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre, changed
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.models.passive import without_own
 from xb_muscle_ros.node.rules import LENGTH_CHANGE_L0
 from xb_muscle_ros.plant.activation import CalciumTable, ReflexActivation, reflex_calcium
 from xb_muscle_ros.plant.plant import Array, Plant
@@ -247,8 +248,7 @@ def without_parallel(fibre: Fibre) -> Fibre:
     It was fitted to stretches of 4 % L0; the knee's swing takes a fibre through ten times that, where the line that the
     element follows would be an invention. The scene has the joint's passive tissue instead.
     """
-    none = {name: 0.0 for name in ("kpe", "Fpe0") if name in fibre.values}
-    return changed(fibre, none, "the knee's muscle")
+    return changed(fibre, without_own(fibre.values), "the knee's muscle")
 
 
 def pca(calcium_um: float) -> float:

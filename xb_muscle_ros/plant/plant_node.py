@@ -11,6 +11,7 @@ from typing import Any
 
 from xb_muscle_ros.node import program
 from xb_muscle_ros.plant.body import MovedBody
+from xb_muscle_ros.plant.scene_fibres import LEG, default_model
 from xb_muscle_ros.plant.translation import RampAndHold
 
 USAGE = """\
@@ -58,7 +59,7 @@ def _one_joint(given: dict[str, Any]) -> MovedBody:
     from xb_muscle_ros.plant.body import Body
     from xb_muscle_ros.plant.plant_parameters import reflex_of
 
-    fibre = load_fibre(given["fiber_file"], given["model"] or "3state_coop")
+    fibre = load_fibre(given["fiber_file"], given["model"] or default_model(given["scene"]))
     return Body(given["scene"], fibre, _platform(given), given["elastic_tendon"], reflex_of(given))
 
 
@@ -66,11 +67,11 @@ def _leg(given: dict[str, Any]) -> MovedBody:
     from xb_muscle_ros.plant.leg.moved import StandingLeg
     from xb_muscle_ros.plant.plant_parameters import reflex_of
 
-    model = given["model"] or "3state_coop_slack"
+    model = given["model"] or default_model(given["scene"])
     return StandingLeg(given["fiber_file"], model, _platform(given), given["elastic_tendon"], reflex_of(given))
 
 
-_BODIES: dict[str, Callable[[dict[str, Any]], MovedBody]] = {"myolegs": _leg}
+_BODIES: dict[str, Callable[[dict[str, Any]], MovedBody]] = {LEG: _leg}
 
 
 if __name__ == "__main__":

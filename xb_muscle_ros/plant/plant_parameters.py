@@ -10,10 +10,11 @@ from typing import Any
 from xb_muscle_ros.node.foreign_keys import foreign_keys, ignored
 from xb_muscle_ros.node.parameters import START, Row, check_value, is_foreign, of_muscle_node, row_descriptor
 from xb_muscle_ros.plant.reflex import NO_REFLEX, Reflex
+from xb_muscle_ros.plant.scene_fibres import SCENES
 
 # All are read at the start only.
 PLANT_PARAMETERS: Mapping[str, Row] = {
-    "scene": Row("ankle", "what to move", START, choices=("ankle", "knee", "myolegs")),
+    "scene": Row("ankle", "what to move", START, choices=SCENES),
     "mode": Row("lockstep", "of the muscle node and so of this one", START, choices=("lockstep", "realtime")),
     "fiber_file": Row("18Dec2017a", "fibre file, path or packaged fibre name", START),
     "model": Row(

@@ -186,3 +186,15 @@ class ReflexLoop:
     def coming(self) -> tuple[Array, ...]:
         """Levels of the ticks after the newest that began, in order, `ticks` of them."""
         return tuple(self._coming)
+
+
+def levels_by_tick(now: Array, reflex: ReflexLoop | None, tick: int) -> list[tuple[int, Array]]:
+    """Level of the newest tick that began and, with a reflex, of those to come, each with its tick.
+
+    Args:
+        now: of the newest tick, shape (muscle,).
+        reflex: what comes next; None: nothing changes.
+        tick: how many were played since the start.
+    """
+    coming = () if reflex is None else reflex.coming
+    return [*enumerate((now, *coming), max(tick - 1, 0))]

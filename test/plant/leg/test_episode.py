@@ -10,8 +10,9 @@ from xb_muscle_ros.plant.leg.body import Body
 from xb_muscle_ros.plant.leg.drives import OwnMuscles
 from xb_muscle_ros.plant.leg.episode import Episode, play
 from xb_muscle_ros.plant.leg.measures import BAR_M, growth, held
+from xb_muscle_ros.plant.leg.report import _samples, beyond_lengths
 from xb_muscle_ros.plant.leg.stance import Stance
-from xb_muscle_ros.plant.leg.study import NUDGE, Pair, pushes, run_model, sways
+from xb_muscle_ros.plant.leg.study import NUDGE, ModelRuns, Pair, pushes, run_model, sways
 from xb_muscle_ros.plant.leg.sway import Sway
 from xb_muscle_ros.plant.translation import RampAndHold
 
@@ -90,6 +91,24 @@ def test_muscle_without_memory_does_not_know_that_the_body_swayed(stance: Stance
     assert plain == Pair(plain.still, runs.pushes[1])
     assert len(done) == len(runs.episodes) == 9
     assert runs.model == "mujoco"
+
+
+def test_a_fibre_beyond_its_lengths_is_told_once_with_the_time(body: Body, stance: Stance) -> None:
+    """Counted from elsewhere, soleus stands short of 1.5 L0 and is stretched beyond; every tick can be written."""
+    plain = played(body, stance, RampAndHold(), 0.2)
+    assert plain.beyond == ""
+    at = body.muscles.index("soleus_r")
+    stretched = (plain.soleus_m - body.optimal_m[at]) / body.l0_m[at]
+    body.optimal_m[at] += body.l0_m[at] * (stretched[100:102].mean() - 0.5)
+    told = played(body, stance, RampAndHold(), 0.2).beyond
+    assert told == "the fibre of soleus_r comes to 1.500 L0, beyond 0.5 to 1.5 L0, from t = 0.101 s on"
+    still, pushed = played(body, stance, None, 0.2), played(body, stance, RampAndHold(), 0.2)
+    runs = ModelRuns(still, still, (pushed, pushed), (Pair(still, pushed),))
+    (first, *_) = beyond_lengths(runs)
+    assert first == f"backwards 7.5 cm, no sway: {told}"
+    rows = [*_samples([runs], 1)]
+    assert len(rows) == 201 * len(runs.episodes)
+    assert [row["time_s"] for row in _samples([runs], 90)][:4] == [0.0, 0.09, 0.18, 0.2]
 
 
 def test_pushes_go_both_ways_in_two_sizes() -> None:

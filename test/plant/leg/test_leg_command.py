@@ -50,7 +50,10 @@ def test_files_are_identical_when_repeated(tmp_path: Path, capsys: pytest.Captur
     with (tmp_path / "one" / "loop.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     # A second each without a push and after the nudge, and 0.3 s each of four pushes and of three for the sway.
-    assert len(rows) == 2 * 1001 + 7 * 301
+    assert len(rows) == 2 * 201 + 7 * 61
+    assert max(len(row["soleus_r.force_n"].strip("-")) for row in rows) <= len("0.12345678e-10")
+    assert tree["csv_step_s"] == 0.005
+    assert run["beyond_lengths"] is None
     assert {row["before"] for row in rows} == {"no sway", "sway 3 % at 1 Hz"}
 
 
@@ -62,6 +65,8 @@ def test_files_are_identical_when_repeated(tmp_path: Path, capsys: pytest.Captur
         (["--sway", "40"], "sway is 40 % of soleus fibre length; allowed is 0 to 10"),
         (["--sway-hz", "0.3"], "sway frequency is 0.3 Hz; allowed are multiples of 0.25"),
         (["--duration", "0.1"], "--duration is 0.1 s; allowed in the scene myolegs is 0.3 to 10"),
+        (["--csv-step", "0.0015"], "--csv-step is 0.0015 s; allowed are whole ticks of 0.001 s, up to 1 s"),
+        (["--scene", "ankle", "--csv-step", "0.01"], "--csv-step only with --scene myolegs"),
         (["--speed", "0"], "platform's speed is 0; allowed is 0.001 to 5"),
         (["--live"], "give one --model, and not mujoco"),
         (["--live", "--model", "mujoco"], "give one --model, and not mujoco"),

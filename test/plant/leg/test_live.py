@@ -13,17 +13,16 @@ pytest.importorskip("myo_sim", reason="needs the extra body")
 pytest.importorskip("rclpy", reason="needs ROS")
 
 FIBRE, MODEL = "18Dec2017a", "3state_coop_slack"
-NODE_MODEL = f"{MODEL}+active_force_length+passive_force_length"
 PUSHED_S = 0.15
 
 
 def node_of(domain: int, mode: str) -> Any:
     """A muscle node with the leg's fibres, which still has other constants and parameters than the leg's."""
     from xb_muscle_ros.node.client.process import NodeProcess
-    from xb_muscle_ros.plant.leg.body import Body
+    from xb_muscle_ros.plant.scene_fibres import scene_fibres
 
-    names = f"[{', '.join(Body().muscles)}]"
-    given = {"mode": mode, "fiber_file": FIBRE, "model": NODE_MODEL, "fibers": names}
+    fibres = scene_fibres("myolegs")
+    given = {"mode": mode, "fiber_file": FIBRE, "model": fibres.model, "fibers": f"[{', '.join(fibres.names)}]"}
     return NodeProcess(domain, given, ["-r", f"__ns:=/{mode}"])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import pickle
 from collections.abc import Callable
 from typing import Any
 
@@ -249,3 +250,72 @@ def test_an_integrator_that_is_changed_later_is_refused(arm: Callable[..., Any])
 def test_the_muscle_of_a_wrong_entry_is_named(arm: Callable[..., Any], entry: dict[str, Any], said: str) -> None:
     with pytest.raises(UserError, match=f"extensor.*{said}"):
         CrossBridgeMuscles(arm(), {"muscles": {"extensor": entry}})
+
+
+@pytest.mark.parametrize("way", ["copy", "deepcopy", "pickle"])
+def test_copies_step_on_with_the_same_bits_and_states_of_their_own(arm: Callable[..., Any], way: str) -> None:
+    """Of two models side by side; a search that tries several continuations needs it."""
+    model = arm()
+    muscles, data = CrossBridgeMuscles(model, {"muscles": {"extensor": {"model": "hill"}}}), mujoco.MjData(model)
+    muscles.reset(data, muscles.calcium_um(0.1))
+    for _ in range(5):
+        muscles.step(data, (0.8, 0.1))
+    ways = {"copy": copy.copy, "deepcopy": copy.deepcopy, "pickle": lambda m: pickle.loads(pickle.dumps(m))}
+    made, again = ways[way](muscles), copy.copy(data)
+    assert (made.model is model) == (way == "copy")
+    if way != "copy":
+        again = mujoco.MjData(made.model)
+        mujoco.mj_copyData(again, made.model, data)
+    other = np.array([made.step(again, (0.2, 0.5)) for _ in range(5)])
+    pulls = np.array([muscles.step(data, (0.2, 0.5)) for _ in range(5)])
+    assert pulls.tobytes() == other.tobytes()
+    assert made.activation.tobytes() == muscles.activation.tobytes()
+
+
+def test_a_copied_environment_keeps_model_and_muscles_together(arm: Callable[..., Any]) -> None:
+    class Environment:
+        def __init__(self) -> None:
+            self.model = arm()
+            self.muscles = CrossBridgeMuscles(self.model)
+
+    made = copy.deepcopy(Environment())
+    assert made.muscles.model is made.model
+    # What is set in the model counts, as before.
+    made.model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    with pytest.raises(UserError, match="integrator is RK4"):
+        made.muscles.step(mujoco.MjData(made.model), 0.1)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("0.1 10", r"muscle flexor has operating range 0\.1 to 10 L0, and no fibre settles at 10 L0 .*'0\.75 1\.05'"),
+        ("0.5 12", r"no fibre settles at 12 L0 .*length change is 11 L0; allowed is -1 to 10"),
+    ],
+)
+def test_an_operating_range_that_no_fibre_has_is_refused_before_anything_changes(
+    arm: Callable[..., Any], given: str, said: str
+) -> None:
+    model = arm(first=f'lengthrange="0.2 0.35" range="{given}" force="500"')
+    before = model.actuator_gaintype.copy()
+    with pytest.raises(UserError, match=said):
+        CrossBridgeMuscles(model)
+    assert (model.actuator_gaintype == before).all()
+
+
+def test_passive_force_that_is_there_twice_is_told_with_the_muscles(arm: Callable[..., Any]) -> None:
+    with pytest.warns(DataWarning, match=r"^flexor, extensor: passive force is there twice .*\(kpe 0\.1\)"):
+        CrossBridgeMuscles(arm(), {"default": {"parameters": {"kpe": 0.1}}})
+
+
+def test_fibres_alone_are_shorter_by_the_stretch_of_an_elastic_tendon(arm: Callable[..., Any]) -> None:
+    """By what the tendon's curve says at the fibre's pull; on a rigid tendon nothing is taken away, to the bit."""
+    muscles = CrossBridgeMuscles(arm(), {"muscles": {"flexor": {"tendon": "elastic"}}})
+    change = np.array([0.1, -0.05])
+    force = np.array([0.6, 0.3])
+    found = muscles.fibre_change_l0(change, force)
+    assert found[1] == change[1]
+    # De Groote et al. (2016): f = 0.2 exp(35 (l - 0.995)) - 0.25, less the length at which f is 0.
+    stretch = np.log((0.6 + 0.25) / 0.2) / 35.0 - np.log(0.25 / 0.2) / 35.0
+    assert change[0] - found[0] == pytest.approx(stretch * muscles.slack_m[0] / muscles.l0_m[0], rel=1e-12)
+    assert muscles.fibre_change_l0(change, np.array([-1e-3, 0.0])).tolist() == change.tolist()

@@ -77,6 +77,19 @@ def test_files_that_hold_no_table(tmp_path: Path, text: str | None, said: str) -
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ("le\0g.yaml", r"table le\x00g.yaml cannot be read: embedded null byte"),
+        ({"muscles": {"sol\0eus_r": {}}}, r"table: the model has no muscle 'sol\x00eus_r'; did you mean 'soleus_r'?"),
+    ],
+)
+def test_names_with_a_nul_are_one_printable_line(table: Any, said: str) -> None:
+    with pytest.raises(UserError) as error:
+        choices(table, NAMES)
+    assert str(error.value) == said
+
+
 @pytest.mark.parametrize("table", [5, ["soleus_r"]])
 def test_what_is_no_table_is_named(table: Any) -> None:
     with pytest.raises(UserError, match=r"table is of type (int|list); needed is a YAML file or the mapping"):

@@ -53,6 +53,7 @@ class Body:
         model, data: MuJoCo's.
         muscles: names of the actuators.
         l0_m: optimal fibre length of each, as MuJoCo's muscle reads it, shape (muscle,).
+        optimal_m: length of the actuator at which the fibre is as long, on a rigid tendon, shape (muscle,).
         tick_s: length of one step.
     """
 
@@ -73,10 +74,16 @@ class Body:
         self.muscles = tuple(self._name(names.mjOBJ_ACTUATOR, i) for i in range(self.model.nu))
         span, fibres = self.model.actuator_lengthrange, self.model.actuator_gainprm[:, :2]
         self.l0_m: Array = (span[:, 1] - span[:, 0]) / (fibres[:, 1] - fibres[:, 0])
+        self.optimal_m: Array = span[:, 0] + (1.0 - fibres[:, 0]) * self.l0_m
         self.tick_s = float(self.model.opt.timestep)
         self._talus = [self.model.body(f"talus_{side}").id for side in SIDES]
         self._floor = self.model.geom("floor").id
         self._sole = self._ends()
+
+    def length_change_l0(self) -> Array:
+        """Lengths of fibres and tendons beyond optimal fibres and slack tendons, shape (muscle,), L0."""
+        change: Array = (self.data.actuator_length - self.optimal_m) / self.l0_m
+        return change
 
     def _name(self, kind: Any, index: int) -> str:
         return str(self.mj.mj_id2name(self.model, kind, index) or "")

@@ -176,8 +176,9 @@ class FibreMuscles:
         data = self._body.data
         pull_n = self._muscles.advance(data, self._now_um)
         if self._reflex is not None:
-            length_l0 = self._muscles.length_change_l0(data)
-            self._now_um = self._reflex.observe(length_l0, pull_n / self._muscles.f0_n)
+            force_f0 = pull_n / self._muscles.f0_n
+            length_l0 = self._muscles.fibre_change_l0(self._muscles.length_change_l0(data), force_f0)
+            self._now_um = self._reflex.observe(length_l0, force_f0)
 
 
 def make_fibres(
@@ -206,7 +207,7 @@ def make_drive(
         fibre: whose model the muscles have; None: MuJoCo's own.
         source: file or name of the fibre.
         elastic: tendons stretch; MuJoCo's muscle has none.
-        reflex: of the muscles, from lengths of fibre and tendon together.
+        reflex: of the muscles, from lengths of the fibres alone.
     """
     if fibre is None:
         return functools.partial(OwnMuscles, reflex=reflex)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.plant.drives import beyond
 from xb_muscle_ros.plant.leg.body import Body
 from xb_muscle_ros.plant.leg.drives import Drive
 from xb_muscle_ros.plant.leg.stance import Stance
@@ -54,6 +55,7 @@ class Episode:
         start_acceleration: largest of all degrees of freedom at the first tick, rad/s² and m/s².
         load_nm_per_rad: m·g·h, see `Body.load_nm_per_rad`.
         end: why it was over early; None: it was not.
+        beyond: which muscle was first beyond the lengths that a fibre has, and when; empty: none was.
     """
 
     model: str
@@ -71,6 +73,7 @@ class Episode:
     start_acceleration: float
     load_nm_per_rad: float
     end: End | None
+    beyond: str = ""
 
 
 def play(
@@ -100,7 +103,7 @@ def play(
     first = body.com_m
     soleus = body.muscles.index("soleus_r")
     rows: list[Array] = []
-    acceleration, end = 0.0, None
+    acceleration, end, outside = 0.0, None, ""
     for k in range(round(duration_s / body.tick_s) + 1):
         at = k * body.tick_s
         body.frame_accelerates(0.0 if platform is None else platform.mean_acceleration(at, body.tick_s))
@@ -108,6 +111,8 @@ def play(
         com = body.com_m
         seen = (at, (com - first) @ body.FORWARD, com[2] - ankle[2], *map(body.angle_rad, JOINTS))
         length = data.actuator_length[soleus]
+        if not outside and (said := beyond(body.muscles, body.length_change_l0())):
+            outside = f"{said}, from t = {at:.3f} s on"
         try:
             drive.advance()
         except UserError as error:
@@ -140,6 +145,7 @@ def play(
         start_acceleration=acceleration,
         load_nm_per_rad=load,
         end=end,
+        beyond=outside,
     )
 
 

@@ -67,7 +67,7 @@ class LiveFibres:
         self._end.send_length(stamp, length_l0)
         force_f0 = self._end.answer(stamp)
         if self._reflex is not None:
-            self._reflex.observe(length_l0, force_f0)
+            self._reflex.observe(self._muscles.fibre_change_l0(length_l0, force_f0), force_f0)
             self._end.send_calcium(stamp + self._reflex.ticks * self._period_ns, self._reflex.ahead)
         self._pull(force_f0)
 

@@ -15,7 +15,7 @@ from xb_muscle_ros.plant.leg.episode import JOINTS, fallen, feet_of
 from xb_muscle_ros.plant.leg.live import architectures
 from xb_muscle_ros.plant.leg.stance import Aim, find_stance
 from xb_muscle_ros.plant.plant import Architecture, Array
-from xb_muscle_ros.plant.reflex import NO_REFLEX, Reflex
+from xb_muscle_ros.plant.reflex import NO_REFLEX, Reflex, levels_by_tick
 from xb_muscle_ros.plant.translation import RampAndHold
 
 
@@ -77,8 +77,7 @@ class StandingLeg:
     @property
     def calcium(self) -> Sequence[tuple[int, Array]]:
         """See `MovedBody`."""
-        coming = () if self._reflex is None else self._reflex.coming
-        return [*enumerate((self._calcium_um, *coming), max(self.tick - 1, 0))]
+        return levels_by_tick(self._calcium_um, self._reflex, self.tick)
 
     @property
     def over(self) -> str:
@@ -113,7 +112,8 @@ class StandingLeg:
         data.ctrl[self._cross_bridges.index] = -self._cross_bridges.f0_n * force_f0
         if self.tick:
             if self._reflex is not None:
-                self._calcium_um = self._reflex.observe(self._length_l0, force_f0)
+                fibre_l0 = self._cross_bridges.fibre_change_l0(self._length_l0, force_f0)
+                self._calcium_um = self._reflex.observe(fibre_l0, force_f0)
             com, height = body.com_m, float(self._first[2] - self._ankle[2])
             body.mj.mj_step2(body.model, data)
             self._fallen = fallen(com, height, self._ankle, self._feet, body)

@@ -19,6 +19,7 @@ from xb_muscle_ros.plant.translation import RampAndHold
 from xb_muscle_ros.tables import Filled, aligned, number, write_csv
 
 _TRACED = ("soleus_r", "gasmed_r", "gaslat_r", "fhl_r", "tibant_r", "vaslat_r")
+_DIGITS = 8
 _SCORES = (
     ("stiffness_20ms_mgh", "stiffness 20 ms [mgh]", ".2f", 1.0),
     ("stiffness_50ms_mgh", "50 ms [mgh]", ".2f", 1.0),
@@ -121,6 +122,15 @@ def ended(runs: Sequence[ModelRuns]) -> list[str]:
     ]
 
 
+def beyond_lengths(one: ModelRuns) -> list[str]:
+    """A line for each episode of a model in which a fibre is longer or shorter than fibres work."""
+    return [
+        f"{push_label(episode.platform)}, {episode.sway.label}: {episode.beyond}"
+        for episode in one.episodes
+        if episode.beyond
+    ]
+
+
 def stance_tree(body: Body, stance: Stance) -> dict[str, Any]:
     """The stance as plain data; the body is put there."""
     # Contact forces of a body at rest, whatever its muscles do now.
@@ -142,16 +152,27 @@ def stance_tree(body: Body, stance: Stance) -> dict[str, Any]:
     }
 
 
-def write(out: Path, body: Body, stance: Stance, runs: Sequence[ModelRuns], settings: dict[str, object]) -> list[Path]:
-    """Write ``loop.json`` (settings, stance, numbers) and ``loop.csv`` (traces); the same runs give the same bytes."""
+def write(
+    out: Path, body: Body, stance: Stance, runs: Sequence[ModelRuns], settings: dict[str, object], every: int = 1
+) -> list[Path]:
+    """Write ``loop.json`` (settings, stance, numbers) and ``loop.csv`` (traces); the same runs give the same bytes.
+
+    Args:
+        out: folder.
+        body, stance, runs: what was run.
+        settings: of the command.
+        every: ticks from one row of ``loop.csv`` to the next; an episode's last tick always has one.
+    """
     tree = {
         "scene": "myolegs",
         **settings,
+        "csv_step_s": every * body.tick_s,
         "stance": stance_tree(body, stance),
         "runs": [
             {
                 "model": one.model,
                 **one.hold.driven_by,
+                "beyond_lengths": beyond_lengths(one) or None,
                 "hold": held(one.hold),
                 "growth": growth(one.nudged),
                 "pushes": [_told(pair) for pair in push_pairs(one)],
@@ -161,7 +182,7 @@ def write(out: Path, body: Body, stance: Stance, runs: Sequence[ModelRuns], sett
         ],
     }
     write_json(out / "loop.json", tree)
-    write_csv(out / "loop.csv", _samples(runs))
+    write_csv(out / "loop.csv", _samples(runs, every))
     return [out / "loop.json", out / "loop.csv"]
 
 
@@ -177,8 +198,8 @@ def _told(pair: Pair) -> dict[str, Any]:
     }
 
 
-def _samples(runs: Sequence[ModelRuns]) -> Iterator[dict[str, Any]]:
-    """Long format: a row for each episode and tick."""
+def _samples(runs: Sequence[ModelRuns], every: int) -> Iterator[dict[str, Any]]:
+    """Long format: a row for each episode and some of its ticks."""
     muscles = runs[0].hold.muscles
     traced = [muscles.index(name) for name in _TRACED]
     names = ["time_s", "com_m", "height_m"]
@@ -187,8 +208,15 @@ def _samples(runs: Sequence[ModelRuns]) -> Iterator[dict[str, Any]]:
     for one in runs:
         for episode in one.episodes:
             label = {"model": one.model, "platform": push_label(episode.platform), "before": episode.sway.label}
-            for values in _columns(episode, traced).tolist():
-                yield {**label, **dict(zip(names, values, strict=True))}
+            last = episode.time_s.size - 1
+            kept = np.unique([*range(0, last, every), last])
+            for values in _columns(episode, traced)[kept].tolist():
+                yield {**label, **dict(zip(names, map(_short, values), strict=True))}
+
+
+def _short(value: float) -> float:
+    """A number to `_DIGITS`: more says nothing of a model, and doubles the file."""
+    return float(f"{value:.{_DIGITS}g}")
 
 
 def _columns(episode: Episode, traced: Sequence[int]) -> Any:

@@ -10,6 +10,7 @@ from scipy.interpolate import PchipInterpolator
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre, changed, load_fibre
 from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.models.passive import without_own
 from xb_muscle_ros.models.registry import SEPARATOR, with_mechanisms
 from xb_muscle_ros.plant.mjcf.table import Choice
 from xb_muscle_ros.plant.plant import Array
@@ -38,6 +39,17 @@ class Calibration:
     least: float
 
 
+def bare_model(model: str) -> str:
+    """A model without `RELATIONS`, which every muscle gets."""
+    name, *mechanisms = model.split(SEPARATOR)
+    return with_mechanisms(name, *(m for m in mechanisms if m not in RELATIONS))
+
+
+def bridged_model(model: str) -> str:
+    """A model as a muscle has it, with `RELATIONS`."""
+    return with_mechanisms(bare_model(model), *RELATIONS)
+
+
 def calibrated(choice: Choice, where: str) -> Calibration:
     """Settle a fibre at rest length over all calcium, and turn force against calcium round.
 
@@ -51,8 +63,7 @@ def calibrated(choice: Choice, where: str) -> Calibration:
     Raises:
         UserError: unknown fibre, model or parameter, or force does not grow with calcium.
     """
-    name, *mechanisms = choice.model.split(SEPARATOR)
-    bare = with_mechanisms(name, *(m for m in mechanisms if m not in RELATIONS))
+    bare = bare_model(choice.model)
     if "Fscale" in choice.parameters:
         raise UserError(
             f"{where}: Fscale is set such that the fibre pulls with one F0 when it is fully active; leave it out, and "
@@ -62,8 +73,7 @@ def calibrated(choice: Choice, where: str) -> Calibration:
         fibre = load_fibre(choice.fibre, bare, choice.method, values=choice.parameters)
     except UserError as error:
         raise UserError(f"{where}: {error}") from error
-    none = {name: 0.0 for name in ("kpe", "Fpe0") if name in fibre.values}
-    fibre = changed(fibre, {**none, **choice.parameters}, where)
+    fibre = changed(fibre, {**without_own(fibre.values), **choice.parameters}, where)
     muscle = Muscle(fibre)
 
     def force(calcium_um: float) -> float:
@@ -74,7 +84,7 @@ def calibrated(choice: Choice, where: str) -> Calibration:
         raise UserError(
             f"{where}: fibre {fibre.name}, model {fibre.model} pulls with {full:.3g} F0 at pCa {FULL_PCA:g}"
         )
-    whole = load_fibre(choice.fibre, with_mechanisms(bare, *RELATIONS), choice.method, values=choice.parameters)
+    whole = load_fibre(choice.fibre, bridged_model(bare), choice.method, values=choice.parameters)
     whole = changed(whole, {**fibre.values, "Fscale": fibre.values["Fscale"] / full}, where)
     pca = list(np.linspace(RELAXED_PCA, FULL_PCA, _FIRST_POINTS))
     share = [force(_um(value)) / full for value in pca]

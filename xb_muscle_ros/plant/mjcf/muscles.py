@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import warnings
 from typing import Any
 
@@ -18,9 +19,11 @@ from xb_muscle_ros.plant.mjcf.groups import Groups, members_of
 from xb_muscle_ros.plant.mjcf.kernels import looked_up
 from xb_muscle_ros.plant.mjcf.table import Table, choices
 from xb_muscle_ros.plant.plant import Array
+from xb_muscle_ros.plant.tendon import strain
 
 _LEVELS = np.linspace(0.0, 1.0, POINTS)
 _SIZES = {"nq": "positions", "nv": "velocities", "nu": "actuators", "na": "activations", "nbody": "bodies"}
+_OF_MUJOCO = ("_mj", "_options", "_several")
 _OVERSHOT = "; the time step is too long for the muscle's time constants: make opt.timestep less than half of timeconst"
 
 
@@ -31,7 +34,11 @@ class CrossBridgeMuscles:
     muscle; a table names fibre, model, constants and tendon of each. The model is changed in place: its muscles become
     plain forces, which `advance` sets.
 
+    `copy.copy` makes muscles of the same model with states of their own, as `copy.copy` of an MjData does;
+    `copy.deepcopy` and pickle take the model along.
+
     Attributes:
+        model: the MjModel.
         names: of the muscles, in the order of all arrays of shape (muscle,) here.
         index: of their actuators, shape (muscle,).
         f0_n, l0_m: peak isometric force, N, and optimal fibre length, m, shape (muscle,).
@@ -71,13 +78,11 @@ class CrossBridgeMuscles:
         self._mj = mujoco()
         muscles = read_muscles(model)
         built = build(self._mj, muscles, choices(table, muscles.names))
-        self._model = model
-        # A view, so that what is set later counts; getting it anew at every step costs as much as what it says.
-        self._options, self._several = model.opt, int(self._mj.mjtIntegrator.mjINT_RK4)
+        self._use(model)
         self.names, self.index = muscles.names, muscles.index
         self.f0_n, self.l0_m, self.slack_m = muscles.f0_n, muscles.l0_m, muscles.slack_m
         self.fibres = built.fibres
-        self._relations = built.relations
+        self._relations, self._elastic_l0 = built.relations, built.elastic_l0
         self._tables, self._table, self._least = built.calcium_um, built.table, built.least
         self._optimal_m, self._per_l0 = muscles.optimal_m, 1.0 / muscles.l0_m
         self._dynamics = ActivationDynamics(muscles)
@@ -89,6 +94,26 @@ class CrossBridgeMuscles:
         for line in (*muscles.warnings, *built.warnings):
             warnings.warn(line, DataWarning, stacklevel=2)
         make_plain(model, muscles.index)
+
+    def _use(self, model: Any) -> None:
+        self.model = model
+        # A view, so that what is set later counts; getting it anew at every step costs as much as what it says.
+        self._options, self._several = model.opt, int(self._mj.mjtIntegrator.mjINT_RK4)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but MuJoCo itself and views of the model's memory."""
+        return {name: value for name, value in self.__dict__.items() if name not in _OF_MUJOCO}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._mj = mujoco()
+        self._use(self.model)
+
+    def __copy__(self) -> CrossBridgeMuscles:
+        made = type(self).__new__(type(self))
+        own = copy.deepcopy((self.fibre_groups, self.activation))
+        made.__setstate__({**self.__getstate__(), "fibre_groups": own[0], "activation": own[1]})
+        return made
 
     def __len__(self) -> int:
         """Number of muscles."""
@@ -103,6 +128,19 @@ class CrossBridgeMuscles:
         """Length of fibre and tendon beyond optimal fibre and slack tendon, shape (muscle,), L0; 0 is optimal."""
         change: Array = (data.actuator_length[self._place] - self._optimal_m) * self._per_l0
         return change
+
+    def fibre_change_l0(self, length_change_l0: Array, force_f0: Array) -> Array:
+        """Length of the fibres alone beyond their optimum, shape (muscle,), L0: what spindles lie along.
+
+        That of fibre and tendon less the tendon's stretch at the fibre's force, where the tendon is elastic.
+
+        Args:
+            length_change_l0: see `length_change_l0`.
+            force_f0: pull of the moment, F0, shape (muscle,).
+        """
+        # A tendon that bears nothing, or is pushed by rounding, is as long as it is slack.
+        fibre: Array = length_change_l0 - self._elastic_l0 * strain(np.maximum(force_f0, 0.0))
+        return fibre
 
     def calcium_um(self, activation: npt.ArrayLike) -> Array:
         """Free calcium at which the isometric force at the optimum is a share of F0, shape (muscle,), µM.
@@ -144,7 +182,7 @@ class CrossBridgeMuscles:
         """
         self._refuse_foreign(data)
         calcium = self._each("calcium", calcium_um)
-        self._mj.mj_fwdPosition(self._model, data)
+        self._mj.mj_fwdPosition(self.model, data)
         self._time_s = data.time
         force = self.fibre_groups.settle(self.length_change_l0(data), calcium)
         rows = [self._tables[row] for row in self._table]
@@ -184,14 +222,14 @@ class CrossBridgeMuscles:
         """
         self._refuse_foreign(data)
         if self._options.integrator == self._several:
-            refuse_substeps(self._model, self._mj)
+            refuse_substeps(self.model, self._mj)
         wanted = self._each("excitation", excitation)
         dt_s = self._timestep_s
         after = self._dynamics.after(self.activation, wanted, dt_s)
-        self._mj.mj_step1(self._model, data)
+        self._mj.mj_step1(self.model, data)
         acting = self.activation if self._early is None else np.where(self._early, after, self.activation)
         pull = self._advance(data, self._calcium(acting, _OVERSHOT), dt_s)
-        self._mj.mj_step2(self._model, data)
+        self._mj.mj_step2(self.model, data)
         self.activation = after
         return pull
 
@@ -220,12 +258,12 @@ class CrossBridgeMuscles:
             UserError: sizes differ, or there are none.
         """
         other = getattr(data, "model", None)
-        if other is self._model:
+        if other is self.model:
             return
         if not isinstance(data, self._mj.MjData):
             raise UserError(f"data is of type {type(data).__name__}; needed is an MjData of the model given before")
         for size, what in _SIZES.items():
-            if getattr(other, size) != (own := getattr(self._model, size)):
+            if getattr(other, size) != (own := getattr(self.model, size)):
                 raise UserError(
                     f"data is of a model with {getattr(other, size)} {what}, the muscles are of one with {own}; give "
                     "an MjData of the model that CrossBridgeMuscles was given"

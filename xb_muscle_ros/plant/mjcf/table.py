@@ -75,7 +75,7 @@ def _read(table: Table) -> tuple[str, Mapping[str, Any]]:
         raise UserError(f"table is of type {type(table).__name__}; needed is a YAML file or the mapping that one holds")
     try:
         tree = fast_yaml.load(Path(table).read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:  # not UTF-8, or a path that no file can have
         raise UserError(f"{where} cannot be read: {error}") from error
     except yaml.YAMLError as error:
         raise UserError(f"{where} is not valid YAML: {error}; mend the line it names") from error
