@@ -238,10 +238,11 @@ def _violation(e: Equations, smooth: bool) -> str:
 
 
 def kernels() -> str:
-    """The loops of `stepping.kernels`, decorated."""
+    """The loops of `stepping.kernels` and `stepping.clamp_kernels`, decorated."""
+    from xb_muscle_ros.stepping import clamp_kernels
     from xb_muscle_ros.stepping import kernels as loops
 
-    return compiled_text(Path(loops.__file__))
+    return "\n\n\n".join(compiled_text(Path(file)) for file in (loops.__file__, clamp_kernels.__file__))
 
 
 def compiled_text(path: Path) -> str:

@@ -98,6 +98,50 @@ def check_samples(fibre: str, dt_s: Array, length_change_l0: Array, calcium_um: 
         _refuse(f"fibre {fibre}, sample {k + 1}", 0.0, 0.0, float(dt_s[k]))
 
 
+def check_loads(fibre: str, dt_s: Array, load_f0: Array, calcium_um: Array) -> None:
+    """Check the samples of a force clamp.
+
+    Args:
+        fibre: named in the message.
+        dt_s: shape (n - 1,), from each sample to the next, s.
+        load_f0, calcium_um: shape (n,), F0 and µM.
+
+    Raises:
+        UserError: out of range, not a number, or of another length; names the first sample at fault.
+    """
+    if load_f0.shape != calcium_um.shape:
+        raise UserError(
+            f"fibre {fibre}: {load_f0.size} loads and {calcium_um.size} values of calcium; needed are as many of both"
+        )
+    check_samples(fibre, dt_s, np.zeros(load_f0.size), calcium_um)
+    if not np.isfinite(load_f0).all():
+        k = int(np.flatnonzero(~np.isfinite(load_f0))[0])
+        check_load(f"{fibre}, sample {k}", float(load_f0[k]))
+
+
+def check_load(fibre: str, load_f0: float) -> None:
+    """Check one load.
+
+    Raises:
+        UserError: not a number.
+    """
+    if not math.isfinite(load_f0):
+        raise UserError(f"fibre {fibre}: load is {load_f0:g} F0; allowed is any number; give the force to hold, F0")
+
+
+def check_limits(fibre: str, shortest_l0: float, longest_l0: float) -> None:
+    """Check the limits between which a length is looked for.
+
+    Raises:
+        UserError: not in order, or beyond what a step takes.
+    """
+    if not SHORTEST_L0 <= shortest_l0 < longest_l0 <= LONGEST_L0:
+        raise UserError(
+            f"fibre {fibre}: limits of the length change are {shortest_l0:g} and {longest_l0:g} L0; allowed are two "
+            f"between {SHORTEST_L0:g} and {LONGEST_L0:g}, the shorter first"
+        )
+
+
 @njit(cache=True)
 def first_refused(length_change_l0: Array, calcium_um: Array) -> int:
     """Place of the first pair that is out of range or not a number, else -1."""

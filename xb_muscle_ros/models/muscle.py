@@ -87,7 +87,7 @@ class Muscle:
         return (*(s.name for s in self._states), "length_change", "velocity", "calcium")
 
     @functools.cached_property
-    def _work(self) -> Array:
+    def work(self) -> Array:
         """Scratch for the compiled loops; one of a batch's fibres never needs its own."""
         return np.zeros((SCRATCH_ROWS, self._n))
 
@@ -215,7 +215,7 @@ class Muscle:
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (dt_s, length_change_l0, calcium_um)]
         check_samples(self.fibre.name, *arrays)
         code, fault, k, within, steps = self.code.run(
-            state, *arrays, self.parameters, GUARD, substeps, every, states, self._work
+            state, *arrays, self.parameters, GUARD, substeps, every, states, self.work
         )
         if code != 0:
             self.complain(code, fault, float(arrays[0][: k - 1].sum() + within), states[-1])
@@ -251,11 +251,9 @@ class Muscle:
         states = np.zeros((sample_s.size, self._n))
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (corner_s, length_change_l0, calcium_um, sample_s)]
         check_samples(self.fibre.name, np.diff(arrays[0]), arrays[1], arrays[2])
-        code, fault, t, steps, _ = self.code.follow(
-            state, *arrays, self.parameters, 1e-4, tolerance, states, self._work
-        )
+        code, fault, t, steps, _ = self.code.follow(state, *arrays, self.parameters, 1e-4, tolerance, states, self.work)
         if code != 0:
-            self.complain(code, fault, t, self._work[1])
+            self.complain(code, fault, t, self.work[1])
         if counts is not None:
             counts.append(steps)
         return states
@@ -279,7 +277,7 @@ class Muscle:
     def _advance(self, state: Array, length: float, calcium: float, dt: float, h: float, tolerance: float) -> Array:
         out = np.empty(self._n)
         code, fault, t, _, _, _ = self.code.advance(
-            state, length, calcium, dt, self.parameters, h, tolerance, out, self._work
+            state, length, calcium, dt, self.parameters, h, tolerance, out, self.work
         )
         if code != 0:
             self.complain(code, fault, t, out)
