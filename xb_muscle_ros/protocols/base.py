@@ -146,21 +146,21 @@ class Found:
         of: `MEASURED`, or the model's parameter set.
         rows: a table; keys are those of `Protocol.columns`.
         numbers: what the whole table gives; keys are those of `Protocol.numbers`.
-        numbers_at: where each of several conditions gives numbers of its own, those by the condition's name, for
-            example ``pCa 6.1``; `numbers` are then those of the first.
         curves: fitted curves, for the figure.
         runs: what it was read off.
         notes: what is missing, and what was taken for granted, one line each.
+        numbers_at: where each of several conditions gives numbers of its own, those by the condition's name, for
+            example ``pCa 6.1``; `numbers` are then those of the first.
     """
 
     fibre: str
     of: str
     rows: tuple[Mapping[str, Cell], ...]
     numbers: Mapping[str, Number] = field(default_factory=dict)
-    numbers_at: Mapping[str, Mapping[str, Number]] = field(default_factory=dict)
     curves: Mapping[str, Curve] = field(default_factory=dict)
     runs: tuple[Run, ...] = ()
     notes: tuple[str, ...] = ()
+    numbers_at: Mapping[str, Mapping[str, Number]] = field(default_factory=dict)
 
     def column(self, key: str) -> Array:
         """Numbers of a column, NaN where there is none, shape (rows,)."""

@@ -235,10 +235,7 @@ def _remarks(found: Sequence[tuple[float | None, ComplexStiffness]], measured: b
             f"{len(bent)} of {len(found)} frequencies, at most {100.0 * (worst.second or 0.0):.3g} % at "
             f"{worst.frequency_hz:.4g} Hz, {_at(pca)}; take a smaller amplitude"
         )
-    scattered = sum(one.from_scatter for _, one in found)
     lacking = sum(one.elastic.se is None for _, one in found) if measured else 0
-    if scattered:
-        notes.append(f"standard errors from the scatter among cycles at {scattered} frequencies: no quiet time")
     if lacking:
         notes.append(f"no standard error at {lacking} frequencies: no quiet time to take noise from, under 4 cycles")
     return notes
@@ -284,4 +281,3 @@ def _numbers(fit: Processes, of_noise: bool) -> Mapping[str, Number]:
             made.setdefault(key, Number(None, why=fit.why))
     made["rmsd_share"] = Number(fit.share)
     return made
-

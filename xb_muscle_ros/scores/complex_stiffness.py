@@ -3,12 +3,15 @@
 Force and length are fitted over the same samples by the same columns: cosine and sine of the frequency and of its
 second harmonic, a level and a line for drift. So any length of record counts, whole cycles or not, and a length that is
 not a pure sinusoid enters by the coefficient that it has. Their quotient is the elastic modulus (real part) and the
-viscous modulus (imaginary part). The coefficients are weighted sums of force, and so are the moduli: their standard
-errors come from the noise's autocovariance (`ForceNoise`), or where that is not known from the scatter among cycles.
+viscous modulus (imaginary part). From six cycles on their standard errors come from the scatter among single cycles:
+what counts is noise at this frequency, which a shorter quiet time does not tell. For fewer cycles they come from the
+noise of the quiet times (`ForceNoise`), the moduli being weighted sums of force; where that is not known, from the
+scatter of four or five cycles.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -21,8 +24,8 @@ from xb_muscle_ros.trials.trial import Array
 
 # Samples in a cycle that sine and cosine need, and those that the second harmonic needs too.
 _FEWEST, _FOR_SECOND = 4.0, 8.0
-# Cycles whose scatter tells a standard error.
-_SCATTER = 4
+# Cycles whose scatter tells a standard error, in place of quiet times and where there are none.
+_SCATTER, _LEAST_SCATTER = 6, 4
 
 
 class ComplexStiffness(NamedTuple):
@@ -52,7 +55,8 @@ class ComplexStiffness(NamedTuple):
     @property
     def value(self) -> complex:
         """Elastic modulus + i · viscous modulus, F0/L0."""
-        assert self.elastic.value is not None and self.viscous.value is not None  # always found
+        assert self.elastic.value is not None
+        assert self.viscous.value is not None
         return complex(self.elastic.value, self.viscous.value)
 
 
@@ -70,7 +74,7 @@ def complex_stiffness(
         time_s, length_l0, force_f0: shape (n,), s, L0 and F0, over at least one cycle.
         frequency_hz: of length.
         noise: of a measured force.
-        measured: without known noise, a standard error is taken from the scatter among cycles.
+        measured: the force has noise; a model's has no standard errors.
 
     Returns:
         nothing where there is less than a cycle, or samples are too few.
@@ -99,17 +103,18 @@ def complex_stiffness(
         twice = complex((weights[:, 2] - 1j * weights[:, 3]) @ force_f0)
         second = abs(twice) / abs(found * of_length) if found else None
     covariance = None
-    if noise is not None:
-        covariance = noise.covariance(np.column_stack([by.real, by.imag]), time_s)
-    elif measured and cycles >= _SCATTER:
+    scattered = measured and cycles >= (_SCATTER if noise is not None else _LEAST_SCATTER) - 1e-6
+    if scattered:
         covariance = _scatter(time_s, length_l0, force_f0, frequency_hz)
+    elif noise is not None:
+        covariance = noise.covariance(np.column_stack([by.real, by.imag]), time_s)
     return ComplexStiffness(
         frequency_hz,
         abs(of_length),
         *_estimates(found, covariance),
         second,
         cycles,
-        noise is None and covariance is not None,
+        scattered,
     )
 
 
@@ -127,19 +132,20 @@ def _estimates(found: complex, covariance: Array | None) -> tuple[Estimate, Esti
     return made[0], made[1], made[2], made[3]
 
 
-def _scatter(time_s: Array, length_l0: Array, force_f0: Array, frequency_hz: float) -> Array | None:
-    """Covariance (2, 2) of the moduli's mean over cycles, from those of single cycles; None for too few."""
+def _scatter(time_s: Array, length_l0: Array, force_f0: Array, frequency_hz: float) -> Array:
+    """Covariance (2, 2) of the moduli's mean over cycles, from those of single cycles."""
     count = int((time_s[-1] - time_s[0]) * frequency_hz + 1e-6)
     edges = time_s[0] + np.arange(count + 1) / frequency_hz
     bounds = np.searchsorted(time_s, edges - 1e-9 / frequency_hz)
+    both = np.column_stack([force_f0, length_l0])
+    # A line of each cycle's own would take from its sine; drift is taken out of all together.
+    drift = sinusoid_columns(time_s - time_s[0], frequency_hz, 1)
+    both = both - np.outer(drift[:, -1], np.linalg.lstsq(drift, both, rcond=None)[0][-1])
     each = []
-    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for begin, end in itertools.pairwise(bounds):
         one = slice(int(begin), int(end))
-        design = sinusoid_columns(time_s[one] - time_s[0], frequency_hz, 1)
-        force, length = np.linalg.lstsq(design, np.column_stack([force_f0[one], length_l0[one]]), rcond=None)[0].T
+        force, length = np.linalg.lstsq(drift[one, :-1], both[one], rcond=None)[0].T
         modulus = (force[0] - 1j * force[1]) / (length[0] - 1j * length[1])
         each.append([modulus.real, modulus.imag])
-    if len(each) < _SCATTER:
-        return None
     covariance: Array = np.cov(np.array(each).T) / len(each)
     return covariance

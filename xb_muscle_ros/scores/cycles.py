@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import numpy.typing as npt
 from scipy.signal import find_peaks
 
 from xb_muscle_ros.trials.trial import Array
@@ -15,6 +15,11 @@ _TURN = 0.25
 # Cycles belong together if period and range differ by no more than these shares from those of the first of them.
 _PERIOD, _RANGE = 0.1, 0.3
 _FEWEST = 2
+# A frequency is sought so often, and to this share.
+_STEPS, _CLOSE = 20, 1e-10
+
+
+Places = npt.NDArray[np.intp]
 
 
 class Oscillation(NamedTuple):
@@ -34,14 +39,13 @@ class Oscillation(NamedTuple):
         return int(self.start_s.size) - 1
 
 
-def turns(length_l0: Array) -> tuple[Array, Array]:
+def turns(length_l0: Array) -> tuple[Places, Places]:
     """Samples of the shortest and of the longest lengths, one in turn with the other, shape (k,) each, as numbers."""
     least = _TURN * float(np.ptp(length_l0)) if length_l0.size else 0.0
     if least == 0.0:
-        return np.empty(0, dtype=int), np.empty(0, dtype=int)
-    # A record may begin or end at a turn: beyond its ends it goes on as if it came back.
-    high = find_peaks(np.pad(length_l0, 1, constant_values=length_l0.min() - least), prominence=least)[0] - 1
-    low = find_peaks(-np.pad(length_l0, 1, constant_values=length_l0.max() + least), prominence=least)[0] - 1
+        return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
+    # The ends of a record are no turns: how far length would have gone is not known.
+    high, low = (find_peaks(sign * length_l0, prominence=least)[0] for sign in (1.0, -1.0))
     return low, high
 
 
@@ -78,18 +82,19 @@ def oscillations(time_s: Array, length_l0: Array) -> list[Oscillation]:
     periods = np.diff(times)
     found, k = [], 0
     while k < periods.size:
-        end = k + 1
-        while (
-            end < periods.size
-            and abs(periods[end] / periods[k] - 1.0) < _PERIOD
-            and abs(by[end] / by[k] - 1.0) < _RANGE
-        ):
+        # A cycle ends where length rises as far as at its begin.
+        end = k
+        while end < periods.size and _alike(periods[end], periods[k], _PERIOD) and _alike(by[end + 1], by[k], _RANGE):
             end += 1
         if end - k >= _FEWEST:
             starts = times[k : end + 1]
             found.append(Oscillation(starts, best_frequency(time_s, length_l0, starts)))
-        k = end
+        k = max(end, k + 1)
     return found
+
+
+def _alike(one: float, other: float, share: float) -> bool:
+    return abs(one / other - 1.0) < share
 
 
 def best_frequency(time_s: Array, length_l0: Array, start_s: Array) -> float:
@@ -98,15 +103,17 @@ def best_frequency(time_s: Array, length_l0: Array, start_s: Array) -> float:
     t, x = time_s[inside] - start_s[0], length_l0[inside]
     cycles = start_s.size - 1
     about = cycles / float(start_s[-1] - start_s[0])
-
-    def rest(frequency: float) -> float:
-        design = sinusoid_columns(t, frequency, 1)
-        return float(np.sum((x - design @ np.linalg.lstsq(design, x, rcond=None)[0]) ** 2))
-
-    # The ends are known to a small part of a cycle.
-    span = 0.2 / cycles
-    bounds = (about * (1.0 - span), about * (1.0 + span))
-    return float(minimize_scalar(rest, bounds=bounds, method="bounded", options={"xatol": 1e-9 * about}).x)
+    found = about
+    # Gauss and Newton; the ends are known to a small part of a cycle.
+    for _ in range(_STEPS):
+        design = sinusoid_columns(t, found, 1)
+        cosine, sine = np.linalg.lstsq(design, x, rcond=None)[0][:2]
+        turn = 2.0 * np.pi * t * (sine * design[:, 0] - cosine * design[:, 1])
+        step = float(np.linalg.lstsq(np.column_stack([design, turn]), x, rcond=None)[0][-1])
+        found = float(np.clip(found + step, about * (1.0 - 0.2 / cycles), about * (1.0 + 0.2 / cycles)))
+        if abs(step) < _CLOSE * about:
+            break
+    return found
 
 
 def sinusoid_columns(time_s: Array, frequency_hz: float, harmonics: int) -> Array:

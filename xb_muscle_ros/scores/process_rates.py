@@ -19,11 +19,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import least_squares
+from scipy import optimize
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
@@ -36,6 +36,7 @@ _ENOUGH = 0.005
 _CHANCE = 0.01
 _WIDEST, _NEAREST = 10.0, 1.5
 _MOST = 3
+_TINY = 1e-300
 # Rates of the grid that a search begins on, and of how many of its best points.
 _GRID, _BEST = 14, 3
 # A rate may be searched this far beyond the frequencies.
@@ -99,7 +100,7 @@ class _Fit(NamedTuple):
     freedom: int
 
     @property
-    def count(self) -> int:
+    def processes(self) -> int:
         return (self.values.size - 1) // 2
 
 
@@ -120,22 +121,27 @@ def fit_processes(frequency_hz: Array, modulus: Complex, se: Complex | None = No
     spread = None if se is None else np.concatenate([se.real, se.imag])
     known = spread is not None and bool(np.all(np.isfinite(spread) & (spread > 0.0)))
     weight = 1.0 / spread if known and spread is not None else np.full(y.size, 1.0)
-    if float(np.std(y * weight)) == 0.0:
-        return Missing("complex stiffness is the same at all frequencies")
-    best, why = None, ""
+    spring = float(np.mean(modulus.real))
+    left = math.sqrt(float(np.mean(np.abs(modulus - spring) ** 2) / np.mean(np.abs(modulus) ** 2)))
+    if left < _ENOUGH:
+        return Missing(f"a spring of {spring:.3g} F0/L0 leaves {100.0 * left:.2g} % of the modulus at all frequencies")
+    best: _Fit | None = None
+    why = ""
     for count in range(1, _MOST + 1):
-        if best is not None and (why := _enough(best, y, weight, known)):
+        if best is not None and (enough := _enough(best, y, weight, known)):
+            why = enough
             break
         if levels < _FEWEST[count]:
-            why = f"{levels} frequencies; {_FEWEST[count]} are needed for {count} processes"
+            why = why or f"{levels} frequencies; {_FEWEST[count]} are needed for {count} processes"
             break
         fit = _fit(frequency_hz, y, weight, count, known)
-        if why := _unsound(fit, best, frequency_hz):
-            if best is None:
-                return Missing(f"no exponential process is told: {why}")
-            break
-        best, why = fit, ""
-    assert best is not None  # the first has been fitted
+        # Where two processes do not describe the data, three may.
+        if unsound := _unsound(fit, best, frequency_hz):
+            why = why or unsound
+        else:
+            best, why = fit, ""
+    if best is None:
+        return Missing(f"no exponential process is told: {why}")
     return _told(best, frequency_hz, y, why or "Kawai's model has three")
 
 
@@ -171,8 +177,9 @@ def _fit(frequency_hz: Array, y: Array, weight: Array, count: int, known: bool) 
     def rest(logs: Array) -> Array:
         return _linear(frequency_hz, y, weight, logs)[1]
 
+    search: Any = optimize.least_squares
     tried = [
-        least_squares(rest, starts[k], bounds=(low, high), xtol=1e-10, ftol=1e-12, gtol=1e-12, max_nfev=200)
+        search(rest, starts[k], bounds=(low, high), xtol=1e-10, ftol=1e-12, gtol=1e-12, max_nfev=200)
         for k in np.argsort(sums)[:_BEST]
     ]
     logs = np.sort(min(tried, key=lambda one: one.cost).x)
@@ -195,9 +202,9 @@ def _enough(fit: _Fit, y: Array, weight: Array, known: bool) -> str:
     """Why no further process is needed; empty where one may be."""
     share = math.sqrt(fit.squares / float(np.sum((y * weight) ** 2)))
     if share < _ENOUGH:
-        return f"{_words(fit.count)} {100.0 * share:.2g} % of the modulus, less than {100.0 * _ENOUGH:g} %"
+        return f"{_words(fit.processes)} {100.0 * share:.2g} % of the modulus, less than {100.0 * _ENOUGH:g} %"
     if known and fit.squares < fit.freedom:
-        return f"{_words(fit.count)} no more than noise"
+        return f"{_words(fit.processes)} no more than noise"
     return ""
 
 
@@ -207,10 +214,11 @@ def _words(count: int) -> str:
 
 def _unsound(fit: _Fit, before: _Fit | None, frequency_hz: Array) -> str:
     """Why the last process is not told by the data; empty where it is."""
-    count = fit.count
+    count = fit.processes
     if before is not None:
-        gain = (before.squares - fit.squares) / 2.0 / max(fit.squares / fit.freedom, np.finfo(float).tiny)
-        if fisher.sf(gain, 2, fit.freedom) > _CHANCE:
+        more = 2 * (count - before.processes)
+        gain = (before.squares - fit.squares) / more / max(fit.squares / fit.freedom, _TINY)
+        if fisher.sf(gain, more, fit.freedom) > _CHANCE:
             return f"{'a second' if count == 2 else 'a third'} process explains no more than chance would"
     errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     width = float(student.ppf(0.975, fit.freedom))
@@ -241,7 +249,7 @@ def _names(magnitudes: Array) -> str:
 
 
 def _told(fit: _Fit, frequency_hz: Array, y: Array, why: str) -> Processes:
-    count = fit.count
+    count = fit.processes
     errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     magnitudes, logs = fit.values[1 : 1 + count], fit.values[1 + count :]
     processes = tuple(
