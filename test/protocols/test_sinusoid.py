@@ -82,7 +82,7 @@ def test_a_spring_beside_a_maxwell_element_has_its_closed_form() -> None:
         trials.append(recorded(trial, 0.5 + base * length + pull))
     (found,) = xb.analyse_protocol("sinusoid", trials, tell=lambda line: None).results
     s = 2j * np.pi * found.column("frequency_hz")
-    assert np.abs(moduli(found) / (base + size * s / (s + rate)) - 1.0).max() < 1e-3
+    assert np.abs(moduli(found) / (base + size * s / (s + rate)) - 1.0).max() < 2e-3
     assert found.numbers["rate_c_per_s"].value == pytest.approx(rate, rel=1e-3)
     assert found.numbers["magnitude_c_f0_per_l0"].value == pytest.approx(size, rel=1e-3)
     assert found.numbers["base_f0_per_l0"].value == pytest.approx(base, rel=1e-2)

@@ -12,6 +12,7 @@ from xb_muscle_ros.protocols.step import QuickSteps
 from xb_muscle_ros.protocols.stretch_shorten_stretch import StretchShortenStretches
 from xb_muscle_ros.protocols.tetanus import Tetani
 from xb_muscle_ros.protocols.twitch import Twitches
+from xb_muscle_ros.protocols.work_loop import WorkLoops
 
 _ALL: tuple[Protocol, ...] = (
     StretchShortenStretches(),
@@ -22,6 +23,7 @@ _ALL: tuple[Protocol, ...] = (
     Twitches(),
     Tetani(),
     Sinusoid(),
+    WorkLoops(),
 )
 PROTOCOLS: dict[str, Protocol] = {protocol.name: protocol for protocol in _ALL}
 

@@ -23,10 +23,10 @@ from xb_muscle_ros.trials.trial import Phase, Trial
 FREQUENCIES_HZ = tuple(float(f"{frequency:.4g}") for frequency in np.geomspace(0.1, 250.0, 30))
 OSCILLATION = "oscillation"
 # Isometric time before, and at least so long are onset and what is read, s.
-_LEAD_S, _ONSET_S, _READ_S = 0.1, 1.0, 0.3
+_LEAD_S, _ONSET_S, _READ_S = 0.1, 0.8, 0.3
 # Samples per second at least: slow oscillations have more samples in a cycle, where stiffness is a small share of what
 # it is at high frequency and corners of a length between samples would count most.
-_SLOWEST_RATE_HZ = 200.0
+_SLOWEST_RATE_HZ = 100.0
 # A second harmonic of force above this share of the first is told.
 _LINEAR = 0.05
 _LETTERS = "abc"
@@ -43,7 +43,7 @@ class Sinusoid(Protocol):
                "of the sinusoid about its middle, L0", many=False),
         Option("frequency", FREQUENCIES_HZ, Allowed(0.001, 10_000.0, "Hz"), "of the sinusoid, Hz"),
         Option("cycles", (3.0,), Allowed(1.0, 10_000.0, ""), "that are read, at least", many=False),
-        Option("samples-per-cycle", (100.0,), Allowed(20.0, 10_000.0, ""), "at least", many=False),
+        Option("samples-per-cycle", (25.0,), Allowed(20.0, 10_000.0, ""), "at least", many=False),
     )  # fmt: skip
     columns: Mapping[str, Column] = {
         "trial": Column("trial"),
