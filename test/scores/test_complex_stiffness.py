@@ -82,4 +82,5 @@ def test_standard_errors_are_those_of_repeated_noise(slow: float, cycles: int, q
     ratio = np.sqrt(np.mean(np.array(told, dtype=float) ** 2, axis=0)) / scatter
     assert np.all(ratio > 0.7)
     if cycles > 3:
-        assert np.all(ratio < 1.4)
+        # Slow noise is in the scatter of single cycles more than in the fit through all.
+        assert np.all(ratio < (1.9 if slow else 1.35))

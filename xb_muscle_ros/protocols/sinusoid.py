@@ -12,21 +12,15 @@ import numpy as np
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.protocols.base import Cell, Column, Curve, Found, Number, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.figures import legend, lettered, looks, plainly
-from xb_muscle_ros.protocols.inputs import calcium_um, facts_of, pca_option, sample_times
+from xb_muscle_ros.protocols.inputs import pca_option
+from xb_muscle_ros.protocols.oscillating import NAME, oscillating, windows_of, with_corners
 from xb_muscle_ros.scores.complex_stiffness import ComplexStiffness, complex_stiffness
-from xb_muscle_ros.scores.cycles import oscillations
 from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.scores.process_rates import Processes, fit_processes
 from xb_muscle_ros.trials.protocol import Allowed
-from xb_muscle_ros.trials.trial import Phase, Trial
+from xb_muscle_ros.trials.trial import Trial
 
 FREQUENCIES_HZ = tuple(float(f"{frequency:.4g}") for frequency in np.geomspace(0.1, 250.0, 30))
-OSCILLATION = "oscillation"
-# Isometric time before, and at least so long are onset and what is read, s.
-_LEAD_S, _ONSET_S, _READ_S = 0.1, 0.8, 0.3
-# Samples per second at least: slow oscillations have more samples in a cycle, where stiffness is a small share of what
-# it is at high frequency and corners of a length between samples would count most.
-_SLOWEST_RATE_HZ = 100.0
 # A second harmonic of force above this share of the first is told.
 _LINEAR = 0.05
 _LETTERS = "abc"
@@ -35,7 +29,7 @@ _LETTERS = "abc"
 class Sinusoid(Protocol):
     """One trial at each frequency and pCa."""
 
-    name = "sinusoid"
+    name = NAME
     title = "small sinusoidal length changes: complex stiffness against frequency, rates of exponential processes"
     options = (
         pca_option(4.5),
@@ -74,33 +68,14 @@ class Sinusoid(Protocol):
         amplitude, cycles, each = (settings[k][0] for k in ("amplitude", "cycles", "samples-per-cycle"))
         made = []
         for pca, frequency in itertools.product(settings["pca"], sorted(settings["frequency"])):
-            onset, read = (
-                np.ceil(max(least_s * frequency, least) - 1e-9) / frequency
-                for least_s, least in ((_ONSET_S, 1.0), (_READ_S, cycles))
-            )
-            rate = max(each * frequency, _SLOWEST_RATE_HZ)
-            edges = np.cumsum([0.0, _LEAD_S, onset, read]).tolist()
-            time_s = sample_times(edges[-1], rate, f"protocol {self.name}, {frequency:g} Hz")
-            angle = 2.0 * np.pi * frequency * np.maximum(time_s - _LEAD_S, 0.0)
-            told = {"pca": pca, "frequency_hz": frequency, "amplitude_l0": amplitude}
-            facts = facts_of(self.name, fibre, f"sinusoid_pca{10.0 * pca:g}_{frequency:g}hz", told)
-            names = ("isometric", "onset", OSCILLATION)
-            phases = tuple(Phase(name, *edges[k : k + 2]) for k, name in enumerate(names))
-            trial = Trial(
-                facts=replace(facts, pca=pca, phases=phases),
-                time_s=time_s,
-                length_m=1.0 + amplitude * np.sin(angle),
-                calcium_time_s=np.zeros(1),
-                calcium_um=np.array([calcium_um(pca)]),
-            )
-            made.append(Planned(trial, trial.time_s, trial.length_change_l0))
+            made.append(oscillating(fibre, pca, frequency, amplitude, cycles, each))
         return made
 
     def repeat(self, muscle: Muscle, trial: Trial, settle_s: float | None = None) -> Run:
         """The recorded length by variable steps where calcium stays: a small oscillation needs small errors."""
         if np.ptp(trial.calcium_um) > 0.0:
             return super().repeat(muscle, trial, settle_s)
-        return self.answer(muscle, Planned(trial, trial.time_s, trial.length_change_l0), settle_s)
+        return self.answer(muscle, with_corners(trial), settle_s)
 
     def analyse(self, fibre: str, of: str, runs: Sequence[Run]) -> Found:
         """Complex stiffness of each oscillation, and the processes at each pCa."""
@@ -109,7 +84,7 @@ class Sinusoid(Protocol):
         found: list[tuple[float | None, ComplexStiffness]] = []
         for run in runs:
             name, pca = run.trial.facts.trial, run.trial.facts.pca
-            windows, told = _windows(run)
+            windows, told = windows_of(run)
             notes += [f"trial {name}: {line}" for line in told]
             for frequency, begin_s, end_s in windows:
                 inside = (run.time_s >= begin_s - 1e-9) & (run.time_s < end_s - 1e-9)
@@ -189,27 +164,6 @@ class Sinusoid(Protocol):
         phase.set_ylabel("phase of force before length (°)")
         legend(magnitude)
         lettered([nyquist, magnitude, phase])
-
-
-def _windows(run: Run) -> tuple[list[tuple[float, float, float]], list[str]]:
-    """Frequency (Hz), begin and end (s) of what is read, and what is said about it."""
-    trial = run.trial
-    frequency, phase = run.setting("frequency_hz"), trial.phases_by_name().get(OSCILLATION)
-    if trial.facts.protocol == Sinusoid.name and frequency is not None and phase is not None:
-        return [(frequency, phase.start_s, phase.end_s)], []
-    seen = oscillations(trial.time_s, trial.length_change_l0)
-    if not seen:
-        return [], ["length does not oscillate for two cycles or more"]
-    windows, told = [], []
-    for one in seen:
-        skipped = 1 if one.cycles > 2 else 0
-        begin_s, end_s = float(one.start_s[skipped]), float(one.start_s[-1])
-        windows.append((one.frequency_hz, begin_s, end_s))
-        told.append(f"{one.frequency_hz:.4g} Hz from {begin_s:.4g} to {end_s:.4g} s")
-    onset = "the first cycle of each is left out" if all(one.cycles > 2 for one in seen) else (
-        "the first cycle is left out where there are three or more"
-    )  # fmt: skip
-    return windows, [f"found from length: {'; '.join(told)}; {onset}"]
 
 
 def _row(one: ComplexStiffness) -> Mapping[str, Cell]:

@@ -265,7 +265,7 @@ def _numbers(rows: Sequence[Mapping[str, Cell]]) -> Mapping[str, Number]:
 
 def _arrows(axis: Any, x: Array, y: Array, colour: str) -> None:
     """Two arrows along a loop."""
-    for share in (0.05, 0.55):
+    for share in (0.05, 0.4):
         k = int(share * x.size)
         ahead = min(k + max(2, x.size // 40), x.size - 1)
         arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 0.9, "shrinkA": 0.0, "shrinkB": 0.0}
