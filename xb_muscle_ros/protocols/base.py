@@ -149,6 +149,8 @@ class Found:
         curves: fitted curves, for the figure.
         runs: what it was read off.
         notes: what is missing, and what was taken for granted, one line each.
+        numbers_at: where each of several conditions gives numbers of its own, those by the condition's name, for
+            example ``pCa 6.1``; `numbers` are then those of the first.
     """
 
     fibre: str
@@ -158,6 +160,7 @@ class Found:
     curves: Mapping[str, Curve] = field(default_factory=dict)
     runs: tuple[Run, ...] = ()
     notes: tuple[str, ...] = ()
+    numbers_at: Mapping[str, Mapping[str, Number]] = field(default_factory=dict)
 
     def column(self, key: str) -> Array:
         """Numbers of a column, NaN where there is none, shape (rows,)."""

@@ -101,8 +101,8 @@ class PulseTransient:
         last = np.searchsorted(pulses, time_s, side="right") - 1
         calcium = np.full(np.shape(time_s), self.rest_um)
         after = last >= 0
-        k, since_s = last[after], time_s[after] - pulses[last[after]]
-        excess = slow[k] * np.exp(-since_s / self.decay_s) - fast[k] * np.exp(-since_s / self.rise_s)
+        which, since_s = last[after], time_s[after] - pulses[last[after]]
+        excess = slow[which] * np.exp(-since_s / self.decay_s) - fast[which] * np.exp(-since_s / self.rise_s)
         calcium[after] += excess / self._largest
         return calcium
 

@@ -64,3 +64,12 @@ def lettered(axes: Sequence[Any]) -> None:
     """A, B, C ... above axes."""
     for letter, axis in zip("ABCDEFGH", axes, strict=False):
         axis.set_title(letter, loc="left", fontweight="bold")
+
+
+def plainly(axis: Any) -> None:
+    """Plain numbers at 1, 2 and 5 of each decade of a logarithmic axis (an ``axes.xaxis`` or ``axes.yaxis``)."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

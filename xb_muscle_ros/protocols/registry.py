@@ -7,10 +7,12 @@ from xb_muscle_ros.protocols.base import Option, Protocol
 from xb_muscle_ros.protocols.force_pca import ForcePca
 from xb_muscle_ros.protocols.ktr import RedevelopmentRates
 from xb_muscle_ros.protocols.ramp_hold import RampAndHold
+from xb_muscle_ros.protocols.sinusoid import Sinusoid
 from xb_muscle_ros.protocols.step import QuickSteps
 from xb_muscle_ros.protocols.stretch_shorten_stretch import StretchShortenStretches
 from xb_muscle_ros.protocols.tetanus import Tetani
 from xb_muscle_ros.protocols.twitch import Twitches
+from xb_muscle_ros.protocols.work_loop import WorkLoops
 
 _ALL: tuple[Protocol, ...] = (
     StretchShortenStretches(),
@@ -20,6 +22,8 @@ _ALL: tuple[Protocol, ...] = (
     RedevelopmentRates(),
     Twitches(),
     Tetani(),
+    Sinusoid(),
+    WorkLoops(),
 )
 PROTOCOLS: dict[str, Protocol] = {protocol.name: protocol for protocol in _ALL}
 

@@ -37,7 +37,8 @@ def tree(protocol: Protocol, found: Sequence[Found]) -> dict[str, Any]:
             {
                 "fibre": each.fibre,
                 "of": each.of,
-                "numbers": {key: each.numbers[key]._asdict() for key in protocol.numbers if key in each.numbers},
+                "numbers": _numbers(protocol, each.numbers),
+                **_at_conditions(protocol, each),
                 "rows": [{key: _plain(row.get(key)) for key in protocol.columns} for row in each.rows],
                 "notes": list(each.notes),
             }
@@ -72,11 +73,14 @@ def numbers_table(protocol: Protocol, found: Sequence[Found]) -> str:
     """Numbers of each fibre and model, Markdown; empty where the protocol has none."""
     if not protocol.numbers:
         return ""
-    head = ["fibre", "of", *(column.head for column in protocol.numbers.values())]
-    lines = [
-        [each.fibre, label(each), *(_shown(each.numbers.get(key), column) for key, column in protocol.numbers.items())]
-        for each in found
-    ]
+    columns = protocol.numbers.items()
+    having = any(each.numbers_at for each in found)
+    head = ["fibre", "of", *(["at"] if having else []), *(column.head for _, column in columns)]
+    lines = []
+    for each in found:
+        for at, numbers in (each.numbers_at or {"": each.numbers}).items():
+            begin = [each.fibre, label(each), *([at] if having else [])]
+            lines.append([*begin, *(_shown(numbers.get(key), column) for key, column in columns)])
     return markdown(head, lines, (0, 1))
 
 
@@ -128,6 +132,17 @@ def draw(folder: Path, protocol: Protocol, found: Sequence[Found]) -> list[Path]
             save(drawn, folder / f"{name}.png")
         made.append(folder / f"{name}.png")
     return made
+
+
+def _numbers(protocol: Protocol, numbers: Mapping[str, Number]) -> dict[str, Any]:
+    return {key: numbers[key]._asdict() for key in protocol.numbers if key in numbers}
+
+
+def _at_conditions(protocol: Protocol, found: Found) -> dict[str, Any]:
+    """``numbers_at``, for a protocol whose conditions have numbers of their own."""
+    if not found.numbers_at:
+        return {}
+    return {"numbers_at": {at: _numbers(protocol, numbers) for at, numbers in found.numbers_at.items()}}
 
 
 def _plain(cell: Cell) -> Any:

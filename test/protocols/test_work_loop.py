@@ -1,0 +1,92 @@
+"""Work loops of models and of made records."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import xb_muscle_ros as xb
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.protocols.base import settings_of
+from xb_muscle_ros.protocols.registry import PROTOCOLS
+from xb_muscle_ros.trials.trial import Trial
+
+FIBRE = "18Dec2017a"
+
+
+@pytest.mark.parametrize("model", ["3state_coop", "2state", "hill"])
+def test_constant_activation_takes_work(model: str) -> None:
+    """Passivity: without phasic activation a steady loop can only absorb, at any frequency."""
+    made = xb.run_protocol(
+        "work-loop", FIBRE, model=model, frequency=[1.0, 5.0], bath_pca=4.5, cycles=4, tell=lambda line: None
+    )
+    (found,) = made.results
+    assert np.all(found.column("net_f0_l0") < 0.0)
+    assert all(trial.facts.pca == 4.5 for trial in made.trials)
+
+
+def test_phase_decides_over_the_sign_of_work() -> None:
+    """Stimulated from the longest length a muscle does work, from the shortest it takes work."""
+    made = xb.run_protocol(
+        "work-loop", FIBRE, frequency=1.0, phase=[-0.05, 0.5], cycles=3, stress=200.0, tell=lambda line: None
+    )
+    does, takes = made.results[0].rows
+    assert does["net_f0_l0"].value > 0.0 > takes["net_f0_l0"].value
+    # 1 Hz, 200 kJ/m³.
+    assert does["power_w_per_l"].value == pytest.approx(200.0 * does["net_f0_l0"].value)
+    assert made.results[0].numbers["power_f0_l0_per_s"].value == does["power_f0_l0_per_s"].value
+
+
+def test_pulses_begin_where_they_are_told() -> None:
+    protocol = PROTOCOLS["work-loop"]
+    options = {"frequency": 2.0, "phase": 0.1, "duty": 0.0, "cycles": 3, "rate": 10_000.0}
+    trial = protocol.plan("made", settings_of(protocol, options))[0].trial
+    rising = np.flatnonzero(np.diff(trial.calcium_um) > 1e-3 * np.ptp(trial.calcium_um))
+    begins_s = trial.calcium_time_s[rising[np.insert(np.diff(rising) > 100, 0, True)]]
+    longest_s = 0.1 + (np.arange(3) + 0.25) / 2.0
+    assert begins_s == pytest.approx(longest_s + 0.1 / 2.0, abs=2e-3)
+    assert trial.length_change_l0[np.searchsorted(trial.time_s, longest_s)] == pytest.approx(0.05)
+
+
+def test_a_recording_without_settings_has_its_cycles_found() -> None:
+    time = np.arange(6001) * 1e-3
+    length = np.where(time < 1.0, 0.0, 0.04 * np.sin(2.0 * np.pi * 1.25 * (time - 1.0)))
+    force = 0.4 + 0.3 * np.where(time < 1.0, 0.0, np.sin(2.0 * np.pi * 1.25 * (time - 1.0) - 0.5))
+    noisy = force + 0.002 * np.random.default_rng(1).standard_normal(time.size)
+    trial = Trial(
+        xb.TrialFacts("made", "loops", phases=(xb.Phase("isometric", 0.0, 1.0),)),
+        time, 1.0 + length, np.zeros(1), np.ones(1), time, noisy,
+    )  # fmt: skip
+    told: list[str] = []
+    (found,) = xb.analyse_protocol("work-loop", [trial], tell=told.append).results
+    (row,) = found.rows
+    net = row["net_f0_l0"]
+    assert net.se is not None
+    assert abs(net.value - np.pi * 0.04 * 0.3 * np.sin(0.5)) < 4.0 * net.se
+    assert net.se < 0.1 * net.value
+    assert row["frequency_hz"] == pytest.approx(1.25, rel=1e-3)
+    assert row["power_f0_l0_per_s"].value == pytest.approx(1.25 * net.value, rel=1e-3)
+    assert any("found from length: 4 cycles of 1.25 Hz" in line for line in told), told
+
+
+def test_what_does_not_repeat_or_move_is_a_note() -> None:
+    protocol = PROTOCOLS["work-loop"]
+    planned = protocol.plan("made", settings_of(protocol, {"frequency": 2.0, "cycles": 4}))[0].trial
+    since = np.maximum(planned.time_s - 0.1, 0.0)
+    growing = 0.5 + since * np.cos(2.0 * np.pi * 2.0 * since)
+    told: list[str] = []
+    trial = replace(planned, force_time_s=planned.time_s, force_n=growing)
+    (found,) = xb.analyse_protocol("work-loop", [trial], tell=told.append).results
+    assert found.rows[0]["repeats_from"] is None
+    assert any("loops do not repeat within 1 % after 4 cycles" in line for line in told)
+    still = xb.simulate(FIBRE, amplitude=0.0, as_measured=True)
+    (found,) = xb.analyse_protocol("work-loop", still, tell=told.append).results
+    assert found.rows == ()
+    assert any("does not go through two cycles" in line for line in told)
+
+
+def test_a_peak_above_the_ceiling_is_refused() -> None:
+    with pytest.raises(UserError, match="ceiling"):
+        xb.run_protocol("work-loop", FIBRE, peak_pca=4.5)

@@ -1,0 +1,48 @@
+"""Cycles, and stretches of one frequency, found from length."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from xb_muscle_ros.scores.cycles import oscillations, rises
+
+TIME_S = np.arange(4001) * 1e-3
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.floats(1.0, 50.0), st.floats(0.0, 6.28), st.floats(-0.1, 0.1), st.floats(0.0, 0.03), st.integers(0, 99))
+def test_the_frequency_of_a_noisy_sinusoid_is_found(
+    frequency: float, angle: float, middle: float, noise: float, seed: int
+) -> None:
+    scatter = noise * np.random.default_rng(seed).standard_normal(TIME_S.size)
+    length = middle + 0.01 * (np.sin(2.0 * np.pi * frequency * TIME_S + angle) + scatter)
+    (found,) = oscillations(TIME_S, length)
+    assert found.frequency_hz == pytest.approx(frequency, rel=1e-3 if noise else 1e-6)
+    assert 4.0 * frequency - 3.0 <= found.cycles <= 4.0 * frequency
+    assert np.diff(found.start_s) == pytest.approx(1.0 / frequency, abs=0.02 / frequency + 2e-3)
+
+
+def test_several_frequencies_in_one_record_are_told_apart() -> None:
+    frequencies, begins = (2.0, 5.0, 20.0), (0.5, 2.0, 3.0)
+    length = np.zeros(TIME_S.size)
+    for frequency, begin, end in zip(frequencies, begins, (2.0, 3.0, 4.0), strict=True):
+        inside = (begin <= TIME_S) & (end > TIME_S)
+        length[inside] = 0.002 * np.sin(2.0 * np.pi * frequency * (TIME_S[inside] - begin))
+    found = oscillations(TIME_S, length)
+    assert [one.frequency_hz for one in found] == pytest.approx(frequencies, rel=1e-3)
+    for one, begin in zip(found, begins, strict=True):
+        assert begin - 1e-3 <= one.start_s[0] <= begin + 1.01 / one.frequency_hz
+
+
+def test_a_still_length_and_a_ramp_have_no_cycles() -> None:
+    for length in (np.zeros(TIME_S.size), np.linspace(0.0, 0.1, TIME_S.size), np.empty(0)):
+        assert oscillations(TIME_S[: length.size], length) == []
+
+
+def test_rises_are_half_way_up() -> None:
+    times, by = rises(TIME_S, 0.3 - 0.05 * np.cos(2.0 * np.pi * TIME_S))
+    assert times == pytest.approx([1.25, 2.25, 3.25], abs=1e-6)
+    assert by == pytest.approx([0.1] * 3, abs=1e-6)

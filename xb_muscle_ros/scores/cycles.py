@@ -1,0 +1,124 @@
+"""Cycles of a length that oscillates: where each begins, and stretches of time in which frequency stays the same."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import find_peaks
+
+from xb_muscle_ros.trials.trial import Array
+
+# A turn counts if length goes this share of its range before it turns again: noise does not.
+_TURN = 0.25
+# Cycles belong together if period and range differ by no more than these shares from those of the first of them.
+_PERIOD, _RANGE = 0.1, 0.3
+_FEWEST = 2
+# A frequency is sought so often, and to this share.
+_STEPS, _CLOSE = 20, 1e-10
+
+
+Places = npt.NDArray[np.intp]
+
+
+class Oscillation(NamedTuple):
+    """Consecutive cycles of one frequency and amplitude.
+
+    Attributes:
+        start_s: begin of each cycle and end of the last, where length rises through its middle, shape (cycles + 1,), s.
+        frequency_hz: that of the sinusoid that fits length best over the cycles.
+    """
+
+    start_s: Array
+    frequency_hz: float
+
+    @property
+    def cycles(self) -> int:
+        """How many there are."""
+        return int(self.start_s.size) - 1
+
+
+def turns(length_l0: Array) -> tuple[Places, Places]:
+    """Samples of the shortest and of the longest lengths, one in turn with the other, shape (k,) each, as numbers."""
+    least = _TURN * float(np.ptp(length_l0)) if length_l0.size else 0.0
+    if least == 0.0:
+        return np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp)
+    # The ends of a record are no turns: how far length would have gone is not known.
+    high, low = (find_peaks(sign * length_l0, prominence=least)[0] for sign in (1.0, -1.0))
+    return low, high
+
+
+def rises(time_s: Array, length_l0: Array) -> tuple[Array, Array]:
+    """Where length rises through the middle between a shortest and the next longest length.
+
+    Args:
+        time_s, length_l0: shape (n,), s and L0.
+
+    Returns:
+        times, shape (k,), s, and how far it rises, shape (k,), L0.
+    """
+    low, high = turns(length_l0)
+    times, by = [], []
+    for begin, after in zip(low, np.searchsorted(high, low, side="right"), strict=True):
+        if after == high.size or np.any((low > begin) & (low < high[after])):
+            continue
+        end = high[after]
+        middle = 0.5 * (length_l0[begin] + length_l0[end])
+        k = begin + int(np.argmax(length_l0[begin : end + 1] >= middle))
+        share = (middle - length_l0[k - 1]) / (length_l0[k] - length_l0[k - 1])
+        times.append(float(time_s[k - 1] + share * (time_s[k] - time_s[k - 1])))
+        by.append(float(length_l0[end] - length_l0[begin]))
+    return np.array(times), np.array(by)
+
+
+def oscillations(time_s: Array, length_l0: Array) -> list[Oscillation]:
+    """Stretches of at least two cycles of the same frequency and amplitude, in order of time.
+
+    Args:
+        time_s, length_l0: shape (n,), s and L0; amplitudes below a quarter of the largest are not seen.
+    """
+    times, by = rises(time_s, length_l0)
+    periods = np.diff(times)
+    found, k = [], 0
+    while k < periods.size:
+        # A cycle ends where length rises as far as at its begin.
+        end = k
+        while end < periods.size and _alike(periods[end], periods[k], _PERIOD) and _alike(by[end + 1], by[k], _RANGE):
+            end += 1
+        if end - k >= _FEWEST:
+            starts = times[k : end + 1]
+            found.append(Oscillation(starts, best_frequency(time_s, length_l0, starts)))
+        k = max(end, k + 1)
+    return found
+
+
+def _alike(one: float, other: float, share: float) -> bool:
+    return abs(one / other - 1.0) < share
+
+
+def best_frequency(time_s: Array, length_l0: Array, start_s: Array) -> float:
+    """Frequency (Hz) of the sinusoid that fits length best between the first and the last of `start_s`."""
+    inside = (time_s >= start_s[0]) & (time_s <= start_s[-1])
+    t, x = time_s[inside] - start_s[0], length_l0[inside]
+    cycles = start_s.size - 1
+    about = cycles / float(start_s[-1] - start_s[0])
+    found = about
+    # Gauss and Newton; the ends are known to a small part of a cycle.
+    for _ in range(_STEPS):
+        design = sinusoid_columns(t, found, 1)
+        cosine, sine = np.linalg.lstsq(design, x, rcond=None)[0][:2]
+        turn = 2.0 * np.pi * t * (sine * design[:, 0] - cosine * design[:, 1])
+        step = float(np.linalg.lstsq(np.column_stack([design, turn]), x, rcond=None)[0][-1])
+        found = float(np.clip(found + step, about * (1.0 - 0.2 / cycles), about * (1.0 + 0.2 / cycles)))
+        if abs(step) < _CLOSE * about:
+            break
+    return found
+
+
+def sinusoid_columns(time_s: Array, frequency_hz: float, harmonics: int) -> Array:
+    """Cosine and sine of each harmonic, a level and a line, shape (n, 2·harmonics + 2)."""
+    angle = 2.0 * np.pi * frequency_hz * time_s
+    waves = [wave(k * angle) for k in range(1, harmonics + 1) for wave in (np.cos, np.sin)]
+    line = (time_s - time_s[0]) / max(float(time_s[-1] - time_s[0]), np.finfo(float).tiny) - 0.5
+    return np.column_stack([*waves, np.ones(time_s.size), line])
