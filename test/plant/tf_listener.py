@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import sys
 
-import mujoco
 from rclpy.serialization import serialize_message
 
 from xb_muscle_ros.node.client.link import Link
 from xb_muscle_ros.plant.display import Display
+from xb_muscle_ros.plant.engine import mujoco
 
 
 def main() -> None:
@@ -16,10 +16,11 @@ def main() -> None:
     from tf2_msgs.msg import TFMessage
 
     domain, text, angle_rad = sys.argv[1:]
-    model = mujoco.MjModel.from_xml_string(text)
-    data = mujoco.MjData(model)
+    mj = mujoco()
+    model = mj.MjModel.from_xml_string(text)
+    data = mj.MjData(model)
     data.qpos[0] = float(angle_rad)
-    mujoco.mj_forward(model, data)
+    mj.mj_forward(model, data)
     heard: list[TFMessage] = []
     with Link("display", "/leg", int(domain)) as link:
         display = Display(link.node, model, data)
