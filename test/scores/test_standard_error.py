@@ -12,11 +12,11 @@ from scipy.signal import lfilter
 from xb_muscle_ros.evaluate.trials import _mean_in_cells
 from xb_muscle_ros.scores.enhancement import Enhancement, Side, enhancement
 from xb_muscle_ros.scores.estimate import Estimate, notes_of
-from xb_muscle_ros.scores.noise.hum import hum
 from xb_muscle_ros.scores.readout import isometric_force, read_off, read_off_measured
 from xb_muscle_ros.scores.redevelopment import Redevelopment, redevelopment
 from xb_muscle_ros.scores.standard_error import force_noise
 from xb_muscle_ros.tables import error_text, unsound, with_error
+from xb_muscle_ros.trials.hum import hum
 from xb_muscle_ros.trials.trial import Array, Phase, Trial, TrialFacts
 
 SRS, LEVEL = 20.0, 0.4

@@ -8,10 +8,10 @@ import numpy as np
 from scipy.optimize import curve_fit
 
 from xb_muscle_ros.scores.estimate import Estimate, Missing
-from xb_muscle_ros.scores.noise.hum import hum
 from xb_muscle_ros.scores.noise.pieces import Piece, evenly_sampled
 from xb_muscle_ros.scores.noise.trials import by_curves
 from xb_muscle_ros.scores.standard_error import ForceNoise
+from xb_muscle_ros.trials.hum import hum
 from xb_muscle_ros.trials.trial import Array, Trial
 
 # A manoeuvre: this much shorter, for at most this long, and back to within this share of the step.

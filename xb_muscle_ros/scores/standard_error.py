@@ -16,11 +16,11 @@ from scipy.linalg import matmul_toeplitz
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.scores.estimate import rounded
-from xb_muscle_ros.scores.noise.hum import Line, hum
 from xb_muscle_ros.scores.noise.model import Source, TrialNoise
 from xb_muscle_ros.scores.noise.pieces import evenly_sampled
 from xb_muscle_ros.scores.noise.trials import ENOUGH, by_windows, noise_of, steady_scatter_f0
 from xb_muscle_ros.scores.noise.windows import LEAST, isometric_window
+from xb_muscle_ros.trials.hum import Line, hum
 from xb_muscle_ros.trials.trial import Array, Trial
 
 

@@ -58,7 +58,7 @@ def hum(step_s: float, force_f0: Array) -> tuple[tuple[Line, ...], Array]:
         frequency = _most_outstanding(time_s, rest, span_s)
         if frequency is None or not _stands_out(time_s, rest, span_s, frequency):
             break
-        wave = _wave(time_s, rest, frequency)
+        wave = sine_in(time_s, rest, frequency)
         lines.append(Line(frequency, float(np.mean(wave**2))))
         rest = rest - wave
     return tuple(lines), rest
@@ -93,11 +93,11 @@ def _stands_out(time_s: Array, force: Array, span_s: float, frequency_hz: float)
 
 
 def _power(time_s: Array, force: Array, frequency_hz: float) -> float:
-    return float(np.mean(_wave(time_s, force, frequency_hz) ** 2))
+    return float(np.mean(sine_in(time_s, force, frequency_hz) ** 2))
 
 
-def _wave(time_s: Array, force: Array, frequency_hz: float) -> Array:
-    """The sine of a frequency in a force that may drift, by least squares, shape (n,)."""
+def sine_in(time_s: Array, force: Array, frequency_hz: float) -> Array:
+    """The sine of a frequency (Hz) in a force that may drift, by least squares, shape (n,)."""
     turn = 2.0 * np.pi * frequency_hz * time_s
     columns = np.column_stack([np.cos(turn), np.sin(turn), np.ones(time_s.size), time_s])
     found, *_ = np.linalg.lstsq(columns, force, rcond=None)

@@ -1,0 +1,86 @@
+"""Hum of the mains is found and told, and a notch takes it out of length and force alike."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import xb_muscle_ros as xb
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.mains import hum_line, hum_of_mains, notched
+from xb_muscle_ros.trials.trial import Trial
+
+
+def recorded(hz: float = 50.0, amplitude: float = 0.0, rate: float = 1000.0, lead_s: float = 1.5) -> Trial:
+    trial = xb.StretchShortenStretch(0.0383, 0.5, lead_s=lead_s, hold_s=1.0).trial("soleus", 6.1, rate)
+    noise = 5e-4 * np.random.default_rng(2).normal(size=trial.time_s.size)
+    hum = amplitude * np.sin(2.0 * np.pi * hz * trial.time_s + 0.7)
+    force = 0.5 + 8.0 * trial.length_change_l0 + hum + noise
+    return replace(trial, force_time_s=trial.time_s, force_n=force)
+
+
+@pytest.mark.parametrize("hz", [49.9, 50.0, 50.1, 60.0])
+@pytest.mark.parametrize("rate", [500.0, 1000.0, 5000.0])
+def test_hum_is_found_with_frequency_and_amplitude(hz: float, rate: float) -> None:
+    trial = recorded(hz, 0.01, rate)
+    quiet = trial.time_s < 1.2
+    found = hum_of_mains(trial.time_s[quiet], trial.force_n[quiet])
+    assert found is not None
+    assert found[0] == pytest.approx(hz, abs=0.05)
+    assert found[1] == pytest.approx(0.01, rel=0.05)
+    assert f"hum of {hz:.1f} Hz" in hum_line(trial)
+    assert f"--notch {round(hz, -1):g}" in hum_line(trial)
+
+
+@pytest.mark.parametrize(("hz", "amplitude"), [(50.0, 0.0), (35.0, 0.02), (50.0, 5e-4)])
+def test_no_hum_is_told_where_there_is_none(hz: float, amplitude: float) -> None:
+    assert hum_line(recorded(hz, amplitude)) == ""
+
+
+def test_a_notch_takes_hum_out_and_leaves_the_rest() -> None:
+    clean, hummed = recorded(), recorded(50.0, 0.02)
+    found = notched(hummed, [50.0])
+    inside = (clean.time_s > 0.3) & (clean.time_s < clean.time_s[-1] - 0.3)
+    apart = found.force_n - notched(clean, [50.0]).force_n
+    # A sine at the middle of the notch is gone but for the ends.
+    assert np.max(np.abs(apart[inside])) < 0.02 * 0.02
+    # Length and force are filtered alike: force is still 8 F0/L0 times length, to the noise.
+    clean = replace(clean, force_n=0.5 + 8.0 * clean.length_change_l0)
+    both = notched(clean, [50.0, 100.0])
+    assert np.allclose(both.force_n - 0.5, 8.0 * both.length_change_l0, atol=1e-9)
+    assert "notch at 50, 100 Hz" in both.facts.source
+
+
+def test_a_notch_has_no_phase() -> None:
+    """What is symmetric about a time stays so: nothing is shifted."""
+    trial = recorded()
+    t = trial.time_s - trial.time_s[trial.time_s.size // 2]
+    bump = np.exp(-0.5 * (t / 0.01) ** 2)
+    found = notched(replace(trial, force_n=bump), [50.0]).force_n
+    middle = slice(trial.time_s.size // 2 - 400, trial.time_s.size // 2 + 401)
+    assert np.allclose(found[middle], found[middle][::-1], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda trial: trial, "a notch at 600 Hz needs more than 1200 samples per second; length has 1000"),
+        (
+            lambda trial: replace(
+                trial, time_s=np.cumsum(np.r_[0.0, np.tile([1e-3, 2e-3], 5000)])[: trial.time_s.size]
+            ),
+            "length is not sampled evenly, which a notch needs",
+        ),
+    ],
+)
+def test_what_cannot_be_filtered_is_said(change, said) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(UserError, match=said):
+        notched(change(recorded()), [600.0])
+
+
+def test_a_short_record_is_refused() -> None:
+    trial = xb.StretchShortenStretch(0.0, 0.0).trial("soleus", 6.1)
+    with pytest.raises(UserError, match=r"lasts 0\.284 s; a notch of 2 Hz needs 1\.5 s"):
+        notched(trial, [50.0])

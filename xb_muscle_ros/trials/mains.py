@@ -1,0 +1,127 @@
+"""Hum of the mains in a recording: told, and on request taken out of length and force by one filter without a phase."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import iirnotch, sosfiltfilt, tf2sos
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.hum import hum, sine_in
+from xb_muscle_ros.trials.phases import initial_isometric
+from xb_muscle_ros.trials.trial import Array, Trial
+
+MAINS_HZ = (50.0, 60.0)
+# The mains keep their frequency to this, Hz; a short record shows it no better than one over its length.
+_NEAR_HZ = 1.0
+# Hum with an amplitude below this is within what any recording has, F0.
+LEAST_F0 = 1e-3
+# Of a longer part the last so many samples are looked at.
+_MOST, _LEAST = 4000, 60
+# Width of a notch between the frequencies that lose half of their power in one pass, Hz: the mains wander by 0.1 Hz.
+WIDTH_HZ = 2.0
+# Samples are even where no step differs from the usual one by more than this share.
+_EVEN = 0.02
+# A record is at least so many times as long as the filter remembers.
+_LONG = 3.0
+_HIGHEST_HZ = 1000.0
+
+
+def hum_of_mains(time_s: Array, force_f0: Array) -> tuple[float, float] | None:
+    """Frequency (Hz) and amplitude (F0) of hum of 50 or 60 Hz in a force that holds still; None where there is none.
+
+    Args:
+        time_s, force_f0: shape (n,), evenly sampled, s and F0.
+    """
+    t, force = time_s[-_MOST:], force_f0[-_MOST:]
+    if t.size < _LEAST:
+        return None
+    step_s = float(t[-1] - t[0]) / (t.size - 1)
+    near = max(_NEAR_HZ, 0.5 / float(t[-1] - t[0]))
+    lines, _ = hum(step_s, force)
+    for line in lines:
+        mains = min(MAINS_HZ, key=lambda hz: abs(hz - line.frequency_hz))
+        amplitude = float(np.sqrt(2.0 * line.power_f0))
+        if abs(mains - line.frequency_hz) <= near and amplitude >= LEAST_F0:
+            return line.frequency_hz, amplitude
+    return None
+
+
+def hum_line(trial: Trial) -> str:
+    """One line on the hum in a trial's force before its first change of length; empty where there is none."""
+    if trial.force_time_s.size < _LEAST or not _even(trial.force_time_s):
+        return ""
+    inside = initial_isometric(trial.force_time_s, trial.facts.phases)
+    found = hum_of_mains(trial.force_time_s[inside], trial.measured_f0[inside])
+    if found is None:
+        return ""
+    mains = min(MAINS_HZ, key=lambda hz: abs(hz - found[0]))
+    return (
+        f"force has hum of {found[0]:.1f} Hz with an amplitude of {100.0 * found[1]:.2g} % F0; --notch {mains:g} of "
+        "import takes it out of length and force"
+    )
+
+
+def notched(trial: Trial, frequencies_hz: Sequence[float]) -> Trial:
+    """A trial without some frequencies: length and force go through the same filter, forwards and backwards.
+
+    Each notch is 2 Hz wide (half power) and shifts nothing in time; a corner of length rings at its frequency, in force
+    as in length.
+
+    Args:
+        frequencies_hz: of the notches, each below half the sampling rate.
+
+    Raises:
+        UserError: samples are not even or too few, or a frequency is none that they show.
+    """
+    where = f"trial {trial.facts.trial}"
+    length = _filtered(where, "length", trial.time_s, trial.length_m, frequencies_hz)
+    force = trial.force_n
+    if trial.force_time_s.size:
+        force = _filtered(where, "force", trial.force_time_s, trial.force_n, frequencies_hz)
+    told = f"notch at {', '.join(f'{hz:g}' for hz in frequencies_hz)} Hz, {WIDTH_HZ:g} Hz wide, on length and force"
+    source = "; ".join(filter(None, [trial.facts.source, told]))
+    return replace(trial, length_m=length, force_n=force, facts=replace(trial.facts, source=source))
+
+
+def check_frequencies(frequencies_hz: Sequence[float], what: str) -> None:
+    """Make sure that a notch can be asked for.
+
+    Raises:
+        UserError: a frequency is out of range.
+    """
+    for hz in frequencies_hz:
+        if not 1.0 <= hz <= _HIGHEST_HZ:
+            raise UserError(f"{what} is {hz:g} Hz; allowed is 1 to {_HIGHEST_HZ:g}, for example 50")
+
+
+def _filtered(where: str, what: str, time_s: Array, values: Array, frequencies_hz: Sequence[float]) -> Array:
+    if time_s.size < 2 or not _even(time_s):
+        raise UserError(f"{where}: {what} is not sampled evenly, which a notch needs; leave --notch out")
+    rate_hz = (time_s.size - 1) / float(time_s[-1] - time_s[0])
+    if time_s[-1] - time_s[0] < _LONG / WIDTH_HZ:
+        raise UserError(
+            f"{where}: {what} lasts {time_s[-1] - time_s[0]:.3g} s; a notch of {WIDTH_HZ:g} Hz needs "
+            f"{_LONG / WIDTH_HZ:g} s; leave --notch out"
+        )
+    level = float(np.mean(values))
+    out = values - level
+    for hz in frequencies_hz:
+        if hz >= 0.5 * rate_hz:
+            raise UserError(
+                f"{where}: a notch at {hz:g} Hz needs more than {2.0 * hz:g} samples per second; {what} has "
+                f"{rate_hz:.4g}"
+            )
+        sections = tf2sos(*iirnotch(hz, hz / WIDTH_HZ, rate_hz))
+        # What is the same all the time goes first: at the ends, where the filter begins, it would stay.
+        out = out - sine_in(time_s, out, hz)
+        # Mirrored for as long as the filter remembers.
+        out = sosfiltfilt(sections, out, padlen=min(int(rate_hz / WIDTH_HZ), out.size - 1))
+    return np.asarray(out + level)
+
+
+def _even(time_s: Array) -> bool:
+    steps = np.diff(time_s)
+    return bool(np.all(np.abs(steps - np.median(steps)) <= _EVEN * np.median(steps)))
