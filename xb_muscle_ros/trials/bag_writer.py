@@ -62,8 +62,14 @@ class _Mcap(McapWriter):
         self._facts = facts
 
     def write(self, connection: Connection, timestamp: int, data: bytes | memoryview) -> None:
-        row = np.frombuffer(bytes(HEAD_BYTES) + bytes(data), np.uint8).copy()
-        self.put([Part(connection, np.array([timestamp]), row[np.newaxis])], np.array([0]))
+        offset = self.chunk.bio.tell()
+        length = _MESSAGE.size + len(data)
+        head = _RECORD.pack(Opcode.MESSAGE, length) + _MESSAGE.pack(connection.id, 0, timestamp, timestamp)
+        self.chunk.bio.write(head)
+        self.chunk.bio.write(data)
+        self._count(connection.id, timestamp, timestamp, np.array([[timestamp, offset]]))
+        if self.chunk.bio.tell() > _CHUNK_BYTES:
+            self.close_chunk()
 
     def put(self, parts: Sequence[Part], order: Ints) -> None:
         """Write the messages of all parts in an order that keeps that of each part."""
@@ -82,20 +88,22 @@ class _Mcap(McapWriter):
                 at, part = starts[which[first:last] == i], parts[i]
                 its = slice(taken[i], taken[i] + at.size)
                 put_rows(chunk, at, part.rows[its])
-                self._count(part.connection.id, part.stamps_ns[its], at + self.chunk.bio.tell())
+                stamps = part.stamps_ns[its]
+                entries = np.column_stack((stamps, at + self.chunk.bio.tell()))
+                self._count(part.connection.id, int(stamps[0]), int(stamps[-1]), entries)
                 taken[i] = its.stop
             self.chunk.bio.write(chunk.data)
             first, begin = last, int(ends[last - 1])
             if self.chunk.bio.tell() > _CHUNK_BYTES:
                 self.close_chunk()
 
-    def _count(self, channel: int, stamps_ns: Stamps, offsets: Ints) -> None:
-        """Take messages into index and statistics."""
-        self._index.setdefault(channel, []).append(np.column_stack((stamps_ns, offsets)))
-        self.channel_stats[channel] += stamps_ns.size
+    def _count(self, channel: int, first_ns: int, last_ns: int, entries: Ints) -> None:
+        """Take messages into index (times in ns, and where in the chunk) and statistics."""
+        self._index.setdefault(channel, []).append(entries)
+        self.channel_stats[channel] += len(entries)
         for of in (self, self.chunk):
-            of.message_start_time = min(of.message_start_time, int(stamps_ns[0]))
-            of.message_end_time = max(of.message_end_time, int(stamps_ns[-1]))
+            of.message_start_time = min(of.message_start_time, first_ns)
+            of.message_end_time = max(of.message_end_time, last_ns)
 
     def close_chunk(self) -> None:
         """Write the chunk, the index of its messages, and keep what tells where they are."""
