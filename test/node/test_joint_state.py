@@ -17,7 +17,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
 from xb_muscle_ros.node import traffic
-from xb_muscle_ros.node.joint_state import FIELDS, Alike, Joints, Layout
+from xb_muscle_ros.node.joint_state import Alike, Joints
+from xb_muscle_ros.trials.joint_layout import FIELDS, Layout
 
 TEXTS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
 NUMBERS = st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=5)

@@ -16,6 +16,7 @@ from xb_muscle_ros.replay.report import RELATIVE, Record, record, table, with_re
 from xb_muscle_ros.replay.run import replay, write_results
 from xb_muscle_ros.scores.estimate import Estimate
 from xb_muscle_ros.scores.readout import ISOMETRIC, SRS_TEST
+from xb_muscle_ros.simulation import offline
 from xb_muscle_ros.simulation.offline import calcium_per_step, simulate_trial
 from xb_muscle_ros.trials.bags import read_simulated, read_trial, write_trial
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
@@ -167,3 +168,30 @@ def test_measured_numbers_come_with_errors_and_a_mark(muscle: Muscle) -> None:
     assert sparse.measured[SRS_TEST].value is None
     assert (sparse.measured[ISOMETRIC].se or 0.0) > 0.0
     assert "SRS of the test stretch, measured, of trial" in table([sparse], "title")
+
+
+def test_parts_of_a_trial_are_the_trial(muscle: Muscle, monkeypatch: pytest.MonkeyPatch) -> None:
+    trial = StretchShortenStretch(0.0383, 0.01).trial("18Dec2017a", 6.1)
+    whole = simulate_trial(muscle, trial)
+    few = replace(trial, time_s=trial.time_s[:9], length_m=trial.length_m[:9])
+    for at_once, given in ((1, few), (7, trial), (trial.time_s.size - 1, trial)):
+        monkeypatch.setattr(offline, "_AT_ONCE", at_once)
+        found = simulate_trial(muscle, given)
+        size = given.time_s.size
+        assert found.force_n.tobytes() == whole.force_n[:size].tobytes()
+        assert found.ce_velocity_m_per_s.tobytes() == whole.ce_velocity_m_per_s[:size].tobytes()
+        assert all(values.tobytes() == whole.moments[name][:size].tobytes() for name, values in found.moments.items())
+
+
+def test_a_fault_in_a_later_part_is_told_as_one_of_the_trial(muscle: Muscle, monkeypatch: pytest.MonkeyPatch) -> None:
+    trial = StretchShortenStretch(0.0383, 0.01).trial("18Dec2017a", 6.1)
+    length = trial.length_m.copy()
+    length[400] = 12.0 * trial.facts.reference_length_m
+    broken = replace(trial, length_m=length)
+    told = []
+    for at_once in (64, trial.time_s.size):
+        monkeypatch.setattr(offline, "_AT_ONCE", at_once)
+        with pytest.raises(UserError, match="sample 400: length change is 11 L0") as refused:
+            simulate_trial(muscle, broken)
+        told.append(str(refused.value))
+    assert told[0] == told[1]

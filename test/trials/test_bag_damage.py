@@ -204,12 +204,14 @@ def test_compressed_chunks_are_read_whole_and_cut(tmp_path: Path, compression: C
     file.write_bytes(data)
     whole = read_recording(file)
     assert whole.damage is None
-    assert [m.log_time_ns for m in whole.messages] == list(range(2000))
+    (messages,) = whole.messages.values()
+    assert [m.log_time_ns for m in messages] == list(range(2000))
     file.write_bytes(data[:400_000])
     cut = read_recording(file)
     assert cut.damage == "cut short after 400000 bytes"
-    assert 500 < len(cut.messages) < 2000
-    assert cut.messages == whole.messages[: len(cut.messages)]
+    (part,) = cut.messages.values()
+    assert 500 < len(part) < 2000
+    assert list(part) == list(messages)[: len(part)]
 
 
 def test_a_wrong_checksum_ends_the_reading(tmp_path: Path) -> None:
@@ -218,4 +220,4 @@ def test_a_wrong_checksum_ends_the_reading(tmp_path: Path) -> None:
     (tmp_path / "c.mcap").write_bytes(data)
     recording = read_recording(tmp_path / "c.mcap")
     assert recording.damage == "damaged, a chunk's checksum is wrong"
-    assert recording.messages == []
+    assert recording.messages == {}

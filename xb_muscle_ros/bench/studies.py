@@ -35,6 +35,7 @@ STUDIES = {
     "trial": Study("a whole trial of 2.34 s", "trial_time"),
     "batch": Study("one tick of 100 fibres, memory of 1,000", "batch_time"),
     "start": Study("a process from nothing to its first step", "start_time"),
+    "records": Study("import and replay of large recordings: time, memory", "records"),
     "cost": Study("cost against accuracy of all solution methods", "cost", draws="cost"),
     "peers": Study("muscles of OpenSim and MuJoCo beside ours: cost, and SRS", "peer_study", draws="peers"),
     "fast": Study("fast stretches with and without forcible detachment", "fast_stretch", draws="fast_stretch"),

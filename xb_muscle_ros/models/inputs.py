@@ -73,13 +73,14 @@ def check_many(
     _refuse(f"fibre {fibres[k]}", float(length_change_l0[k]), float(calcium_um[k]), dt_s)
 
 
-def check_samples(fibre: str, dt_s: Array, length_change_l0: Array, calcium_um: Array) -> None:
+def check_samples(fibre: str, dt_s: Array, length_change_l0: Array, calcium_um: Array, first: int = 0) -> None:
     """Check the samples of a run, in one pass.
 
     Args:
         fibre: named in the message.
         dt_s: shape (n - 1,), from each sample to the next, s.
         length_change_l0, calcium_um: shape (n,), L0 and µM.
+        first: which sample of all the first one is, for the message.
 
     Raises:
         UserError: out of range, not a number, or of another length; names the first sample at fault.
@@ -92,10 +93,10 @@ def check_samples(fibre: str, dt_s: Array, length_change_l0: Array, calcium_um: 
         )
     k = first_refused(length_change_l0, calcium_um)
     if k >= 0:
-        _refuse(f"fibre {fibre}, sample {k}", float(length_change_l0[k]), float(calcium_um[k]), 1.0)
+        _refuse(f"fibre {fibre}, sample {first + k}", float(length_change_l0[k]), float(calcium_um[k]), 1.0)
     if size > 1 and not (dt_s.min() > 0.0 and dt_s.max() <= LONGEST_S):
         k = int(np.flatnonzero(~((dt_s > 0.0) & (dt_s <= LONGEST_S)))[0])
-        _refuse(f"fibre {fibre}, sample {k + 1}", 0.0, 0.0, float(dt_s[k]))
+        _refuse(f"fibre {fibre}, sample {first + k + 1}", 0.0, 0.0, float(dt_s[k]))
 
 
 def check_loads(fibre: str, dt_s: Array, load_f0: Array, calcium_um: Array) -> None:

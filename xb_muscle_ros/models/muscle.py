@@ -195,6 +195,7 @@ class Muscle:
         substeps: int = 1,
         every: int = 1,
         counts: list[int] | None = None,
+        begin_s: float = 0.0,
     ) -> Array:
         """States at every sample, shape (n, state): the result of `step` from sample to sample, bit for bit.
 
@@ -206,6 +207,7 @@ class Muscle:
             substeps: steps between two samples.
             every: stride of the samples whose states are returned, the first included.
             counts: the number of steps that were tried is added to it.
+            begin_s: time of the first sample, s, where a fault is told.
 
         Raises:
             UserError: see `inputs.check_samples`.
@@ -213,12 +215,12 @@ class Muscle:
         """
         states = np.zeros(((length_change_l0.size - 1) // every + 1, self._n))
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (dt_s, length_change_l0, calcium_um)]
-        check_samples(self.fibre.name, *arrays)
+        check_samples(self.fibre.name, arrays[0], arrays[1], arrays[2])
         code, fault, k, within, steps = self.code.run(
             state, *arrays, self.parameters, GUARD, substeps, every, states, self.work
         )
         if code != 0:
-            self.complain(code, fault, float(arrays[0][: k - 1].sum() + within), states[-1])
+            self.complain(code, fault, begin_s + float(arrays[0][: k - 1].sum() + within), states[-1])
         if counts is not None:
             counts.append(steps)
         return states

@@ -13,10 +13,10 @@ from numba import njit
 
 from xb_muscle_ros.models.muscle import Outputs
 from xb_muscle_ros.models.registry import PUSHES_F0
-from xb_muscle_ros.node.joint_state import FIELDS
 from xb_muscle_ros.node.names import KINDS_KEPT, Indices
 from xb_muscle_ros.node.stepping import Floats
 from xb_muscle_ros.node.traffic import Outlet
+from xb_muscle_ros.trials.joint_layout import FIELDS
 from xb_muscle_ros.trials.simulated import MOMENTS
 
 _FORCE, _CE_LENGTH, _CE_VELOCITY, _FIRST = (

@@ -16,10 +16,11 @@ from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.utilities import get_rmw_implementation_identifier
 from sensor_msgs.msg import JointState
 
-from xb_muscle_ros.node.joint_state import FIELDS, Alike, Joints, Layout
+from xb_muscle_ros.node.joint_state import Alike, Joints
 from xb_muscle_ros.node.names import KINDS_KEPT
 from xb_muscle_ros.node.rules import Refusal
 from xb_muscle_ros.node.stepping import Floats
+from xb_muscle_ros.trials.joint_layout import FIELDS, Layout
 
 # Those for which bytes were tried.
 _MIDDLEWARE = ("rmw_fastrtps_cpp",)

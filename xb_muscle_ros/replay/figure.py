@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, SHADE
+from xb_muscle_ros.plotting.thinned import thinned
 from xb_muscle_ros.plotting.trial_pages import Look, draw_pages
 from xb_muscle_ros.trials.simulated import Simulated
-from xb_muscle_ros.trials.trial import Trial
+from xb_muscle_ros.trials.trial import Array, Trial
 
 _PER_PAGE = 9
 # Wide lines would show more noise than there is, points.
@@ -45,7 +46,9 @@ def draw_replay(
 
 def _panel(upper: Any, lower: Any, trial: Trial, simulated: Simulated, label: str, live: Simulated | None) -> list[Any]:
     facts = trial.facts
-    upper.plot(trial.time_s, 100.0 * trial.length_change_l0, color="black", linewidth=_LINE)
+    shown = thinned(trial.time_s, trial.length_m)
+    change = trial.length_m[shown] / facts.reference_length_m - 1.0
+    upper.plot(trial.time_s[shown], 100.0 * change, color="black", linewidth=_LINE)
     upper.tick_params(labelbottom=False)
     _at_least(upper, _LEAST_RANGE)
     title = facts.trial if facts.pca is None else f"{facts.trial}  (pCa {facts.pca:.3g})"
@@ -56,15 +59,23 @@ def _panel(upper: Any, lower: Any, trial: Trial, simulated: Simulated, label: st
                 axes.axvspan(phase.start_s, phase.end_s, color=SHADE, linewidth=0)
     lines = []
     if trial.force_time_s.size:
-        lines += lower.plot(trial.force_time_s, trial.measured_f0, color=DATA, linewidth=_LINE, label="measured")
-    lines += lower.plot(simulated.time_s, simulated.force_n / facts.f0_n, color=MODEL, linewidth=_LINE, label=label)
+        line = _force(trial.force_time_s, trial.force_n, facts.f0_n)
+        lines += lower.plot(*line, color=DATA, linewidth=_LINE, label="measured")
+    line = _force(simulated.time_s, simulated.force_n, facts.f0_n)
+    lines += lower.plot(*line, color=MODEL, linewidth=_LINE, label=label)
     if live is not None:
         lines += lower.plot(
-            live.time_s, live.force_n / facts.f0_n, color=SECOND, linestyle=(0, (1, 3)), linewidth=1.8,
+            *_force(live.time_s, live.force_n, facts.f0_n), color=SECOND, linestyle=(0, (1, 3)), linewidth=1.8,
             label="through muscle_node",
         )  # fmt: skip
     lower.set_ylim(bottom=min(0.0, lower.get_ylim()[0]))
     return lines
+
+
+def _force(time_s: Array, force_n: Array, f0_n: float) -> tuple[Array, Array]:
+    """What to draw of a force: s, F0."""
+    shown = thinned(time_s, force_n)
+    return time_s[shown], force_n[shown] / f0_n
 
 
 def _at_least(axis: Any, least: float) -> None:

@@ -21,6 +21,7 @@ from xb_muscle_ros.scores.readout import (
 from xb_muscle_ros.scores.rmsd import force_rmsds, short_windows
 from xb_muscle_ros.tables import MARK, MARK_NOTE, Columns, aligned, filled, number, with_error
 from xb_muscle_ros.trials.simulated import Simulated
+from xb_muscle_ros.trials.spool import release
 from xb_muscle_ros.trials.trial import Trial
 
 RELATIVE = "relative_srs"
@@ -71,6 +72,7 @@ def record(trial: Trial, simulated: Simulated, fibre: Fibre) -> Record:
     """What there is to say of one trial; relative SRS is left to `with_relative_srs`."""
     facts = trial.facts
     force = simulated.force_n / facts.f0_n
+    release(simulated.force_n)
     ours = read_off(trial, simulated.time_s, force)
     theirs = read_off_measured(trial) if trial.force_time_s.size else dict.fromkeys(TEXT, Estimate(None))
     notes = [f"RMSD, {name}: {why}" for name, why in short_windows(trial).items()]

@@ -10,8 +10,8 @@ import numpy as np
 from xb_muscle_ros.scores.estimate import Estimate, quotient
 from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN, ForceNoise, force_noise
 from xb_muscle_ros.scores.steady import steady_part
-from xb_muscle_ros.scores.stiffness import stiffness_of_phase
-from xb_muscle_ros.trials.trial import Array, Trial
+from xb_muscle_ros.scores.stiffness import WINDOW_S, stiffness_of_phase
+from xb_muscle_ros.trials.trial import Array, Phase, Trial
 
 SRS_CONDITIONING, SRS_TEST, ISOMETRIC = "srs_conditioning", "srs_test", "isometric_f0"
 Done = tuple[str, float | None, float | None, float | None]
@@ -44,11 +44,17 @@ def read_off(trial: Trial, time_s: Array, force_f0: Array, noise: ForceNoise | N
         time_s, force_f0: shape (n,), s and F0.
         noise: of the force; None for simulated force.
     """
-    length = np.interp(time_s, trial.time_s, trial.length_change_l0)
     phases = trial.phases_by_name()
+
+    def srs(phase: Phase | None) -> Estimate:
+        begin_s = -np.inf if phase is None else phase.start_s
+        near = slice(*np.searchsorted(time_s, [begin_s, begin_s + 2.0 * WINDOW_S]).tolist())
+        length = trial.length_change_at(time_s[near])
+        return stiffness_of_phase(time_s[near], length, force_f0[near], phase, noise)
+
     return {
-        SRS_CONDITIONING: stiffness_of_phase(time_s, length, force_f0, phases.get("conditioning_stretch"), noise),
-        SRS_TEST: stiffness_of_phase(time_s, length, force_f0, phases.get("test_stretch"), noise),
+        SRS_CONDITIONING: srs(phases.get("conditioning_stretch")),
+        SRS_TEST: srs(phases.get("test_stretch")),
         ISOMETRIC: isometric_force(trial, time_s, force_f0, noise),
     }
 

@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, MutableMapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from xb_muscle_ros.errors import UserError, naming
+from xb_muscle_ros.models.inputs import check_samples
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.models.registry import PUSHES_F0, slack_of
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
+from xb_muscle_ros.trials.spool import release, roomy
 from xb_muscle_ros.trials.stamps import to_ns
 from xb_muscle_ros.trials.trial import Array, Trial
+
+# So many samples are simulated together.
+_AT_ONCE = 1 << 16
+_ANSWER = ("force_n", "ce_length_m", "ce_velocity_m_per_s")
 
 
 def calcium_per_step(trial: Trial) -> Array:
@@ -23,7 +30,12 @@ def calcium_per_step(trial: Trial) -> Array:
     Raises:
         UserError: no calcium is known at the first sample.
     """
-    starts = np.concatenate([trial.time_s[:1], trial.time_s[:-1]])
+    return _calcium(trial, 0, trial.time_s.size)
+
+
+def _calcium(trial: Trial, first: int, end: int) -> Array:
+    """The same of some of the samples."""
+    starts = trial.time_s[first - 1 : end - 1] if first else np.concatenate([trial.time_s[:1], trial.time_s[: end - 1]])
     index = np.searchsorted(trial.calcium_time_s, starts, side="right") - 1
     if index[0] < 0:
         raise UserError(
@@ -79,12 +91,44 @@ def simulate_trial(muscle: Muscle, trial: Trial, substeps: int = 1, settle_s: fl
         UserError: no calcium at the start, or length or calcium out of range; names the trial.
         StateViolation: see `Muscle.step`; names the trial.
     """
-    calcium = calcium_per_step(trial)
-    # Whole nanoseconds, as message stamps have them: the node computes the same differences.
-    dt_s = np.diff(to_ns(trial.time_s)) / 1e9
+    # Part by part, because the states and outputs of an hour at 1 kHz would take half a gigabyte.
+    size = trial.time_s.size
+    parts = [slice(max(first - 1, 0), min(first + _AT_ONCE, size)) for first in range(0, size, _AT_ONCE)]
+    answer = {name: roomy(size) for name in (*_ANSWER, *MOMENTS)}
+    begin = _driven(trial, slice(0, 1))
     with naming(f"trial {trial.facts.trial}"):
-        out = outputs(muscle, dt_s, trial.length_change_l0, calcium, substeps, settle_s)
-    return as_simulated(trial, trial.time_s, out)
+        state = muscle.settle(float(begin.length_l0[0]), float(begin.calcium_um[0]), settle_s)
+        for part in parts:
+            check_samples(muscle.fibre.name, *_driven(trial, part), part.start)
+        for part in parts:
+            begin_s = float(trial.time_s[part.start] - trial.time_s[0])
+            states = muscle.run(state, *_driven(trial, part), substeps, begin_s=begin_s)
+            state = states[-1].copy()
+            made = as_simulated(trial, trial.time_s[part], muscle.outputs_of(states))
+            for name in _ANSWER:
+                answer[name][part] = getattr(made, name)
+            for name in MOMENTS:
+                answer[name][part] = made.moments[name]
+            release(*answer.values())
+    for values in answer.values():
+        values.setflags(write=False)
+    moments = {name: answer.pop(name) for name in MOMENTS}
+    return Simulated(trial.time_s, **answer, moments=moments)
+
+
+class _Driven(NamedTuple):
+    """What drives a fibre: time between samples (s), length change at them (L0), calcium (µM) as in `outputs`."""
+
+    dt_s: Array
+    length_l0: Array
+    calcium_um: Array
+
+
+def _driven(trial: Trial, part: slice) -> _Driven:
+    # Whole nanoseconds, as message stamps have them: the node computes the same differences.
+    dt_s = np.diff(to_ns(trial.time_s[part])) / 1e9
+    length_l0 = trial.length_m[part] / trial.facts.reference_length_m - 1.0
+    return _Driven(dt_s, length_l0, _calcium(trial, part.start, part.stop))
 
 
 def as_simulated(trial: Trial, time_s: Array, out: Mapping[str, Array]) -> Simulated:

@@ -18,7 +18,8 @@ from xb_muscle_ros import fast_yaml
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bag_files import METADATA, mcap_files
-from xb_muscle_ros.trials.mcap_records import Message, Recording, read_recording
+from xb_muscle_ros.trials.mcap_records import Recording, read_recording
+from xb_muscle_ros.trials.messages import Message, Messages
 
 _IDL_BEGIN = "=" * 80 + "\n"
 
@@ -31,9 +32,7 @@ class BagContents:
         types: message type of each topic, of those without messages too.
         encodings: message encoding of each topic.
         definitions: format and text of each message type that the bag describes.
-        messages: messages of each topic that has any, in the order of log time over all files; messages of one log
-            time keep the order of the files.
-        as_filed: the same in the order of the files, for topics where that is another one.
+        messages: messages of each topic that has any, over all files.
         custom_data: the bag's strings; None where they are lost.
         flaws: what is wrong with the bag and was lived with.
     """
@@ -42,8 +41,7 @@ class BagContents:
     types: dict[str, str]
     encodings: dict[str, str]
     definitions: dict[str, tuple[str, str]]
-    messages: dict[str, list[Message]]
-    as_filed: dict[str, list[Message]]
+    messages: dict[str, Messages]
     custom_data: dict[str, str] | None
     flaws: tuple[str, ...]
 
@@ -70,28 +68,25 @@ def open_bag(path: Path, topics: Container[str] | None = None) -> BagContents:
     information, flaws = _information(path)
     files, missing = _files(path, information)
     flaws += missing
-    bag = BagContents(path, {}, {}, {}, {}, {}, None, ())
-    filed: dict[str, list[Message]] = {}
+    bag = BagContents(path, {}, {}, {}, {}, None, ())
     copies: list[tuple[str, dict[str, Any]]] = []
     for file in files:
         recording = _recording(path, file, topics)
         bag.types.update(recording.types)
         bag.encodings.update(recording.encodings)
         bag.definitions.update(recording.definitions)
-        for message in recording.messages:
-            filed.setdefault(message.topic, []).append(message)
+        for topic, messages in recording.messages.items():
+            bag.messages.setdefault(topic, Messages(topic)).extend(messages)
         if recording.damage:
             flaws.append(f"{file.name} is {recording.damage}")
         copy = _parsed(recording.metadata.get("rosbag2", {}).get("serialized_metadata", ""))
         if copy is not None:
             copies.append((file.name, copy))
-    if not filed and topics is None:
+    if not bag.messages and topics is None:
         why = "; ".join(flaws) or "it holds no message"
         raise UserError(f"bag {path} is empty: {why}; record it again")
     custom_data, note = _custom_data(information, copies)
-    messages = {topic: sorted(each, key=lambda message: message.log_time_ns) for topic, each in filed.items()}
-    as_filed = {topic: each for topic, each in filed.items() if each != messages[topic]}
-    return replace(bag, messages=messages, as_filed=as_filed, custom_data=custom_data, flaws=(*flaws, *note))
+    return replace(bag, custom_data=custom_data, flaws=(*flaws, *note))
 
 
 def _recording(bag: Path, file: Path, topics: Container[str] | None) -> Recording:

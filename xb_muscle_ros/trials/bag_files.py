@@ -135,14 +135,14 @@ def _follow_each_other(files: list[Path]) -> bool:
     end_ns: int | None = None
     for file in files:
         try:
-            logged = [message.log_time_ns for message in read_recording(file).messages]
+            logged = [messages.log_times() for messages in read_recording(file).messages.values()]
         except (OSError, ValueError):
             return False
         if not logged:
             continue
-        if end_ns is not None and not 0 <= min(logged) - end_ns <= SPLIT_GAP_NS:
+        if end_ns is not None and not 0 <= min(int(times.min()) for times in logged) - end_ns <= SPLIT_GAP_NS:
             return False
-        end_ns = max(logged)
+        end_ns = max(int(times.max()) for times in logged)
     return True
 
 

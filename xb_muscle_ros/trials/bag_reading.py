@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,7 +13,6 @@ from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bag_contents import open_bag
 from xb_muscle_ros.trials.bag_topics import Samples, Topics
 from xb_muscle_ros.trials.custom_data import facts_from_custom_data
-from xb_muscle_ros.trials.ros_types import JointState
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
 from xb_muscle_ros.trials.trial import Trial, TrialFacts
 
@@ -84,6 +84,8 @@ class TrialBag:
         names = sorted({each.name for each in found} - {facts.fibre})
         if names:
             warnings.append(f"bag {self.path}: messages name '{names[0]}', the trial facts name fibre '{facts.fibre}'")
+        # One array for both where length and force come together, as in most recordings.
+        same_clock = force is not None and np.array_equal(force.time_s, length.time_s)
         none = Samples(np.empty(0), np.empty((0, 1)), fibre)
         trial = Trial(
             facts=facts,
@@ -91,7 +93,7 @@ class TrialBag:
             length_m=length.values[:, 0],
             calcium_time_s=calcium.time_s,
             calcium_um=calcium.values[:, 0],
-            force_time_s=(force or none).time_s,
+            force_time_s=length.time_s if same_clock else (force or none).time_s,
             force_n=(force or none).values[:, 0],
             warnings=tuple(warnings),
             force_is_measured=measured,
@@ -164,7 +166,7 @@ def read_simulated(path: Path) -> Simulated | None:
         return None
     fibre = topics.names(ros_types.FORCE)[0]
     force = topics.samples(ros_types.FORCE, ("effort", "position", "velocity"), fibre)
-    moments = topics.rows(ros_types.MOMENTS, _moments)
+    moments = topics.rows(ros_types.MOMENTS, _moments, len(MOMENTS))
     time_s, at_force, at_moments = np.intersect1d(force.time_s, moments.time_s, return_indices=True)
     if time_s.size == 0:
         raise UserError(f"bag {path}: {ros_types.FORCE} and {ros_types.MOMENTS} have no stamp in common")
@@ -178,12 +180,12 @@ def read_simulated(path: Path) -> Simulated | None:
     )
 
 
-def _moments(message: JointState) -> list[float]:
-    held = {name.rpartition("/")[2]: value for name, value in zip(message.name, message.position, strict=False)}
-    missing = [name for name in MOMENTS if name not in held]
+def _moments(names: Sequence[str]) -> list[tuple[str, int]]:
+    places = {name.rpartition("/")[2]: i for i, name in enumerate(names)}
+    missing = [name for name in MOMENTS if name not in places]
     if missing:
         raise ValueError(f"has no {missing[0]}; needed: {', '.join(MOMENTS)}")
-    return [float(held[name]) for name in MOMENTS]
+    return [("position", places[name]) for name in MOMENTS]
 
 
 def _listed(names: list[str]) -> str:

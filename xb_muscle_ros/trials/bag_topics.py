@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,8 +10,10 @@ import numpy as np
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bag_contents import BagContents, decoded
+from xb_muscle_ros.trials.joint_columns import Pick, Picked, UnusualError, names_of, picked
+from xb_muscle_ros.trials.messages import Messages
 from xb_muscle_ros.trials.ros_types import JointState
-from xb_muscle_ros.trials.stamps import Stamps, not_after, to_s
+from xb_muscle_ros.trials.stamps import not_after, to_s
 from xb_muscle_ros.trials.trial import Array
 
 
@@ -34,7 +36,7 @@ class Samples(NamedTuple):
 
 
 class Topics:
-    """The JointState topics of a bag, each decoded once.
+    """The JointState topics of a bag.
 
     Args:
         bag: as opened.
@@ -54,7 +56,10 @@ class Topics:
         Raises:
             UserError: no message, not JointState, or a message without a name.
         """
-        seen: dict[str, None] = {}
+        try:
+            return names_of(self._raw(topic))
+        except UnusualError:
+            seen: dict[str, None] = {}
         for i, message in enumerate(self._messages(topic)):
             if not message.name:
                 raise UserError(
@@ -70,57 +75,74 @@ class Topics:
             UserError: see `names`; stamps that do not increase, values that are missing or not finite.
         """
 
-        def row(message: JointState) -> list[float] | None:
-            names = list(message.name)
-            return [_value(message, field, names.index(name)) for field in fields] if name in names else None
+        def pick(names: Sequence[str]) -> list[tuple[str, int]] | None:
+            return [(field, names.index(name)) for field in fields] if name in names else None
 
-        return self.rows(topic, row, name)
+        return self.rows(topic, pick, len(fields), name)
 
-    def rows(self, topic: str, row: Callable[[JointState], list[float] | None], name: str = "") -> Samples:
-        """Stamps and what a function makes of each message; it skips one by None, and refuses one by a ValueError.
+    def rows(self, topic: str, pick: Pick, width: int, name: str = "") -> Samples:
+        """Stamps and the numbers of each message that are asked for.
+
+        Args:
+            pick: which, by a message's names; it skips one by None, and refuses one by a ValueError.
+            width: how many.
 
         Raises:
             UserError: as `samples`.
         """
-        kept, warnings = self._kept(topic, row), []
-        if not_after(kept.stamps).size and topic in self.bag.as_filed:
+        kept, warnings = self._kept(topic, pick, width), []
+        if not_after(kept.stamps_ns).size and self._raw(topic).order is not None:
             # A recorder's own clock may step back; then the file has the order.
-            filed = self._kept(topic, row, as_filed=True)
-            if not not_after(filed.stamps).size:
+            filed = self._kept(topic, pick, width, as_filed=True)
+            if not not_after(filed.stamps_ns).size:
                 kept = filed
                 warnings.append(
                     f"bag {self.bag.path}: {topic} is in the order of the file, because log times step back"
                 )
-        for i in not_after(kept.stamps)[:1].tolist():
+        stamps, values = kept.stamps_ns, kept.values
+        for i in not_after(stamps)[:1].tolist():
             raise UserError(
-                f"{self._at(topic, kept.places[i], kept.stamps[i])} does not come after the one before, t = "
-                f"{kept.stamps[i - 1] / 1e9:.9f} s; header stamps have to increase"
+                f"{self._at(topic, kept.places[i], stamps[i])} does not come after the one before, t = "
+                f"{stamps[i - 1] / 1e9:.9f} s; header stamps have to increase"
             )
-        values = np.array(kept.rows, dtype=np.float64)
         for i, j in np.argwhere(~np.isfinite(values))[:1].tolist():
-            where = self._at(topic, kept.places[i], kept.stamps[i])
+            where = self._at(topic, kept.places[i], stamps[i])
             raise UserError(f"{where} has the value {values[i, j]}; allowed are finite numbers")
-        total = len(self._messages(topic))
-        others = total - len(kept.rows)
+        total = len(self._raw(topic))
+        others = total - len(values)
         skipped = f"{others} of {total} messages on {topic}" if others else ""
-        return Samples(to_s(kept.stamps), values, name, tuple(warnings), skipped)
+        time_s = to_s(stamps)
+        time_s.setflags(write=False)
+        return Samples(time_s, values, name, tuple(warnings), skipped)
 
-    def _kept(self, topic: str, row: Callable[[JointState], list[float] | None], as_filed: bool = False) -> _Kept:
+    def _kept(self, topic: str, pick: Pick, width: int, as_filed: bool = False) -> Picked:
+        try:
+            return picked(self._raw(topic), pick, width, as_filed)
+        except UnusualError:
+            return self._kept_one_by_one(topic, pick, width, as_filed)
+
+    def _kept_one_by_one(self, topic: str, pick: Pick, width: int, as_filed: bool) -> Picked:
         rows, places, stamps = [], [], []
         for i, message in enumerate(self._messages(topic, as_filed)):
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
             try:
-                values = row(message)
+                wanted = pick(list(message.name))
+                values = None if wanted is None else [_value(message, field, at) for field, at in wanted]
             except ValueError as problem:
                 raise UserError(f"{self._at(topic, i, stamp)} {problem}") from None
             if values is not None:
                 rows.append(values)
                 places.append(i)
                 stamps.append(stamp)
-        return _Kept(np.array(stamps, dtype=np.int64), rows, places)
+        values_of = np.array(rows, dtype=np.float64).reshape(-1, width)
+        return Picked(np.array(stamps, dtype=np.int64), values_of, np.array(places, dtype=np.int64))
 
-    def _messages(self, topic: str, as_filed: bool = False) -> list[JointState]:
-        """All messages of a topic in the order of log time, or in that of the files."""
+    def _raw(self, topic: str) -> Messages:
+        """Messages of a topic, which are JointState.
+
+        Raises:
+            UserError: there are none, or they are others.
+        """
         bag = self.bag
         if topic not in bag.messages:
             raise UserError(
@@ -132,21 +154,18 @@ class Topics:
                 f"bag {bag.path}: {topic} is {bag.types[topic] or 'of no known type'} ({bag.encodings[topic]}); "
                 f"allowed is {ros_types.JOINT_STATE} (cdr)"
             )
+        return bag.messages[topic]
+
+    def _messages(self, topic: str, as_filed: bool = False) -> list[JointState]:
+        """All messages of a topic in the order of log time, or in that of the files."""
         if (topic, as_filed) not in self._decoded:
-            raw = (bag.as_filed if as_filed else bag.messages)[topic]
-            self._decoded[topic, as_filed] = [each.message for each in decoded(bag, topic, raw, ros_types.typestore())]
+            raw = self._raw(topic)
+            each = decoded(self.bag, topic, raw.as_filed() if as_filed else raw, ros_types.typestore())
+            self._decoded[topic, as_filed] = [one.message for one in each]
         return self._decoded[topic, as_filed]
 
     def _at(self, topic: str, i: int, stamp: int) -> str:
         return f"bag {self.bag.path}: {topic}, message {i} at t = {stamp / 1e9:.9f} s"
-
-
-class _Kept(NamedTuple):
-    """Messages that are taken: their stamps, what was made of them, and which of the topic each is, from 0."""
-
-    stamps: Stamps
-    rows: list[list[float]]
-    places: list[int]
 
 
 def _value(message: JointState, field: str, at: int) -> float:

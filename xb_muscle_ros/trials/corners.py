@@ -117,20 +117,29 @@ def _quiet_slope(time_s: Array, length: Array) -> tuple[Array, int]:
 
 def _fastest(slope: Array, lasting: int) -> float:
     """The fastest slope that lasts: a glitch of one sample is faster than any ramp."""
-    windows = np.lib.stride_tricks.sliding_window_view(slope, min(lasting, slope.size))
-    return float(max(np.max(np.min(windows, axis=1)), -np.min(np.max(windows, axis=1)), 0.0))
+    count = slope.size - min(lasting, slope.size) + 1
+    found = 0.0
+    for sign in (1.0, -1.0):
+        least = sign * slope[:count]
+        for k in range(1, slope.size - count + 1):
+            np.minimum(least, sign * slope[k : k + count], out=least)
+        found = max(found, float(np.max(least)))
+    return found
 
 
 def _slope(time_s: Array, length: Array, half_window: int) -> Array:
     """Mean of the samples after minus mean of those before, over the time between; shape (n,)."""
 
     def after_minus_before(values: Array) -> Array:
-        total = np.concatenate(([0.0], np.cumsum(values - values[0])))
-        centre = np.arange(half_window, values.size - half_window)
-        after = total[centre + half_window + 1] - total[centre + 1]
-        before = total[centre] - total[centre - half_window]
-        result: Array = (after - before) / half_window
-        return result
+        # total[k] is the sum of the samples before the k-th.
+        total = np.zeros(values.size + 1)
+        np.cumsum(values - values[0], out=total[1:])
+        count = values.size - 2 * half_window
+        after = total[2 * half_window + 1 :] - total[half_window + 1 : half_window + 1 + count]
+        before = total[half_window : half_window + count] - total[:count]
+        after -= before
+        after /= half_window
+        return after
 
     inner = after_minus_before(length) / after_minus_before(time_s)
     return np.pad(inner, half_window, mode="edge")

@@ -2,38 +2,48 @@
 
 A recorder that was stopped hard leaves a file without its end: no index, perhaps half a chunk. Readers that begin
 with the index give nothing then; this one gives every message that is whole, and says where and how the file ends.
-The layout is that of the MCAP specification; records with text are decoded by the `mcap` library.
+The layout is that of the MCAP specification; records with text are decoded by the `mcap` library. Messages that follow
+each other are taken together: one by one they would take seconds where a recording has a million.
 """
 
 from __future__ import annotations
 
+import os
 import struct
 import zlib
-from collections.abc import Container, Iterator
+from collections.abc import Container, Generator, Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 import lz4.frame  # type: ignore[import-untyped]  # it ships no types
+import numpy as np
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Metadata, Schema
 
+from xb_muscle_ros.trials.messages import LOG_BYTES, Bytes, Ints, Messages
+from xb_muscle_ros.trials.rows import rows_of
+
 MAGIC = b"\x89MCAP0\r\n"
 _RECORD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _CHUNK = struct.Struct("<QQQII")
+# Where a message record has its log time.
+_LOG_AT = slice(6, 6 + LOG_BYTES)
+# So much of a file is read at once, or one record where that is longer, bytes.
+_WINDOW = 1 << 22
 
 
-class Message(NamedTuple):
-    """One message: where it was published, when it was logged (ns), and its bytes."""
+class _Run(NamedTuple):
+    """Message records that follow each other: where each begins within the data, and where the last ends."""
 
-    topic: str
-    log_time_ns: int
-    data: bytes
+    data: memoryview
+    starts: list[int]
+    end: int
 
 
 @dataclass
@@ -44,7 +54,7 @@ class Recording:
         types: message type of each topic; a topic without schema has the type ''.
         encodings: encoding of each topic's messages, ``cdr`` in ROS 2.
         definitions: format (``ros2msg`` or ``ros2idl``) and text of each message type that the file describes.
-        messages: in the order of the file.
+        messages: of each topic that has any.
         metadata: named maps of strings; rosbag2 keeps a copy of its metadata in ``rosbag2``.
         damage: where and how the file ends too early; None for a whole file.
     """
@@ -52,7 +62,7 @@ class Recording:
     types: dict[str, str] = field(default_factory=dict)
     encodings: dict[str, str] = field(default_factory=dict)
     definitions: dict[str, tuple[str, str]] = field(default_factory=dict)
-    messages: list[Message] = field(default_factory=list)
+    messages: dict[str, Messages] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     damage: str | None = None
 
@@ -75,67 +85,136 @@ def read_recording(path: Path, topics: Container[str] | None = None) -> Recordin
         OSError: the file cannot be opened.
         ValueError: the file is no MCAP file.
     """
-    data = path.read_bytes()
-    if data[: len(MAGIC)] != MAGIC[: len(data)]:
-        raise ValueError("it does not begin like an MCAP file")
-    recording = Recording()
-    schemas: dict[int, str] = {}
-    channels: dict[int, str] = {}
-    try:
-        for opcode, content in _records(memoryview(data), len(MAGIC)):
-            if opcode == Opcode.FOOTER:
-                break
-            try:
-                if opcode == Opcode.MESSAGE:
-                    channel, _, log_time_ns, _ = _MESSAGE.unpack_from(content)
-                    if channel not in channels:
-                        raise _DamageError(f"a message belongs to channel {channel}, which the file does not describe")
-                    if topics is None or channels[channel] in topics:
-                        message = Message(channels[channel], log_time_ns, bytes(content[_MESSAGE.size :]))
-                        recording.messages.append(message)
-                elif opcode == Opcode.SCHEMA:
-                    schema = Schema.read(_stream(content))
-                    schemas[schema.id] = schema.name
-                    if schema.data:
-                        text = bytes(schema.data).decode(errors="replace")
-                        recording.definitions[schema.name] = (schema.encoding, text)
-                elif opcode == Opcode.CHANNEL:
-                    described = Channel.read(_stream(content))
-                    channels[described.id] = described.topic
-                    recording.types[described.topic] = schemas.get(described.schema_id, "")
-                    recording.encodings[described.topic] = described.message_encoding
-                elif opcode == Opcode.METADATA:
-                    named = Metadata.read(_stream(content))
-                    recording.metadata[named.name] = named.metadata
-            except (struct.error, UnicodeDecodeError, McapError) as problem:
-                raise _DamageError(f"a record cannot be read ({problem})") from problem
-        else:
-            raise _CutError
-    except _CutError:
-        recording.damage = f"cut short after {len(data)} bytes"
-    except _DamageError as damage:
-        recording.damage = f"damaged, {damage}"
+    with path.open("rb") as file:
+        size = os.fstat(file.fileno()).st_size
+        if file.read(len(MAGIC)) != MAGIC[:size]:
+            raise ValueError("it does not begin like an MCAP file")
+        recording = Recording()
+        try:
+            _read(file, size, recording, topics)
+        except _CutError:
+            recording.damage = f"cut short after {size} bytes"
+        except _DamageError as damage:
+            recording.damage = f"damaged, {damage}"
     return recording
 
 
-def _records(data: memoryview, position: int) -> Iterator[tuple[int, memoryview]]:
-    """Whole records as (opcode, content); in place of a chunk those within it, as far as they are there."""
-    while position < len(data):
-        if position + _RECORD.size > len(data):
-            raise _CutError
-        opcode, length = _RECORD.unpack_from(data, position)
+def _read(file: BinaryIO, size: int, recording: Recording, topics: Container[str] | None) -> None:
+    schemas: dict[int, str] = {}
+    channels: dict[int, str] = {}
+    for opcode, content in _records(file, size):
+        if opcode == Opcode.FOOTER:
+            return
+        try:
+            if isinstance(content, _Run):
+                _take(content, channels, recording.messages, topics)
+            elif opcode == Opcode.SCHEMA:
+                schema = Schema.read(_stream(content))
+                schemas[schema.id] = schema.name
+                if schema.data:
+                    text = bytes(schema.data).decode(errors="replace")
+                    recording.definitions[schema.name] = (schema.encoding, text)
+            elif opcode == Opcode.CHANNEL:
+                described = Channel.read(_stream(content))
+                channels[described.id] = described.topic
+                recording.types[described.topic] = schemas.get(described.schema_id, "")
+                recording.encodings[described.topic] = described.message_encoding
+            elif opcode == Opcode.METADATA:
+                named = Metadata.read(_stream(content))
+                recording.metadata[named.name] = named.metadata
+        except (struct.error, UnicodeDecodeError, McapError) as problem:
+            raise _DamageError(f"a record cannot be read ({problem})") from problem
+    raise _CutError
+
+
+def _take(run: _Run, channels: dict[int, str], found: dict[str, Messages], topics: Container[str] | None) -> None:
+    """Put messages to those of their topics, up to the first that is none."""
+    buffer = np.frombuffer(run.data, np.uint8)
+    starts = np.array(run.starts, dtype=np.int64) + _RECORD.size
+    sizes = np.diff(starts, append=run.end + _RECORD.size) - _RECORD.size
+    short = np.flatnonzero(sizes < _MESSAGE.size)
+    count = int(short[0]) if short.size else starts.size
+    numbers = np.concatenate([rows_of(buffer, starts[:count], 2)]).view("<u2")[:, 0].astype(np.int64)
+    unknown = np.flatnonzero(~np.isin(numbers, list(channels)))
+    count = int(unknown[0]) if unknown.size else count
+    _take_known(buffer, starts[:count], sizes[:count], numbers[:count], channels, found, topics)
+    if unknown.size:
+        raise _DamageError(f"a message belongs to channel {numbers[count]}, which the file does not describe")
+    if short.size:
+        begin = int(starts[count])
+        _MESSAGE.unpack_from(run.data[begin : begin + int(sizes[count])])
+
+
+def _take_known(
+    buffer: Bytes, starts: Ints, sizes: Ints, numbers: Ints, channels: dict[int, str],
+    found: dict[str, Messages], topics: Container[str] | None,
+) -> None:  # fmt: skip
+    for topic in dict.fromkeys(channels[number] for number in dict.fromkeys(numbers.tolist())):
+        if topics is not None and topic not in topics:
+            continue
+        of_topic = np.isin(numbers, [number for number, its in channels.items() if its == topic])
+        begins, lengths = starts[of_topic], sizes[of_topic]
+        groups: list[tuple[Ints | None, Bytes]] = []
+        for size in dict.fromkeys(lengths.tolist()):
+            places = np.flatnonzero(lengths == size)
+            records = rows_of(buffer, begins[places], size)
+            rows = np.concatenate((records[:, _LOG_AT], records[:, _MESSAGE.size :]), axis=1)
+            groups.append((None if places.size == lengths.size else places, rows))
+        found.setdefault(topic, Messages(topic)).add_batch(groups)
+
+
+def _records(file: BinaryIO, size: int) -> Iterator[tuple[int, memoryview | _Run]]:
+    """Whole records of a file, in place of a chunk those within it, as far as they are there."""
+    position, window = len(MAGIC), _WINDOW
+    while position < size:
+        file.seek(position)
+        data = memoryview(file.read(min(window, size - position)))
+        done = yield from _whole(data, position, position + len(data) >= size)
+        position += done
+        # A record that is longer than what was read is read whole.
+        window = _WINDOW if done else max(_WINDOW, _RECORD.size + _RECORD.unpack_from(data)[1])
+
+
+def _whole(data: memoryview, at: int, ends: bool) -> Generator[tuple[int, memoryview | _Run], None, int]:
+    """Whole records of a part; messages that follow each other come together.
+
+    Args:
+        at: where the part begins, for messages.
+        ends: nothing comes after it, so that a record that is not whole is cut.
+
+    Returns:
+        where the first record begins that is not whole.
+    """
+    position, size, starts = 0, len(data), list[int]()
+    unpack, head, message = _RECORD.unpack_from, _RECORD.size, int(Opcode.MESSAGE)
+    while position + head <= size:
+        opcode, length = unpack(data, position)
+        end = position + head + length
+        if opcode == message and end <= size:
+            starts.append(position)
+            position = end
+            continue
+        if starts:
+            yield message, _Run(data, starts, position)
+            starts = []
         if opcode == 0:
-            raise _DamageError(f"there is no record where one should be, at byte {position}")
-        position += _RECORD.size
-        content = data[position : position + length]
-        whole = len(content) == length
+            raise _DamageError(f"there is no record where one should be, at byte {at + position}")
+        whole = end <= size
+        if not whole and not ends:
+            return position
+        content = data[position + head : end]
         if opcode == Opcode.CHUNK:
-            yield from _records(memoryview(_chunk(content, whole)), 0)
+            yield from _whole(memoryview(_chunk(content, whole)), 0, True)
         elif whole:
             yield opcode, content
         if not whole:
             raise _CutError
-        position += length
+        position = end
+    if starts:
+        yield message, _Run(data, starts, position)
+    if ends and position < size:
+        raise _CutError
+    return position
 
 
 def _chunk(content: memoryview, whole: bool) -> bytes | memoryview:

@@ -18,7 +18,8 @@ _AROUND = 5
 
 def to_ns(time_s: Array) -> Stamps:
     """Times in s to stamps in ns, nearest; exact for stamps read with `to_s` up to 26 days."""
-    stamps: Stamps = np.rint(np.asarray(time_s, dtype=np.float64) * 1e9).astype(np.int64)
+    scaled = np.asarray(np.multiply(time_s, 1e9, dtype=np.float64))
+    stamps: Stamps = np.rint(scaled, out=scaled).astype(np.int64)
     return stamps
 
 
@@ -29,7 +30,7 @@ def to_s(stamps_ns: Stamps) -> Array:
 
 def not_after(stamps_ns: Stamps) -> npt.NDArray[np.intp]:
     """Places of stamps that do not come after the one before: time went back, or a stamp comes twice."""
-    return np.flatnonzero(np.diff(stamps_ns) <= 0) + 1
+    return np.flatnonzero(stamps_ns[1:] <= stamps_ns[:-1]) + 1
 
 
 class Gap(NamedTuple):

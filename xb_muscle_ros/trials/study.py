@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.bag_files import find_bags
-from xb_muscle_ros.trials.bag_reading import TrialBag
+from xb_muscle_ros.trials.bag_reading import Reading, TrialBag
 from xb_muscle_ros.trials.between_samples import with_corners
 from xb_muscle_ros.trials.checks import check_values
 from xb_muscle_ros.trials.completing import Known, complete, counted
@@ -50,8 +50,11 @@ def read_study(paths: Iterable[str | Path], fibre: str, known: Known, only: str 
     for path in find_bags(paths):
         bag = TrialBag(path)
         chosen = _chosen(bag, fibre, only)
-        trial, told = trial_of_bag(bag, chosen, known, str(path))
         others = [name for name in bag.fibres if name != chosen]
+        reading = bag.reading(chosen)
+        del bag  # its messages take as much memory as the trial
+        trial, told = trial_of(reading, known, str(path))
+        del reading
         if others:
             told = (*told, left_out(chosen, others))
         trials.append(trial)
@@ -62,12 +65,20 @@ def read_study(paths: Iterable[str | Path], fibre: str, known: Known, only: str 
 def trial_of_bag(bag: TrialBag, fibre: str, known: Known, where: str) -> tuple[Trial, tuple[str, ...]]:
     """One fibre's trial, complete and checked, and lines on what is not the bag's own.
 
-    Corners of length that lie between samples are put back here, so that every command simulates the same lengths.
-
     Raises:
         UserError: see `TrialBag.reading` and `check_values`.
     """
-    reading = bag.reading(fibre)
+    return trial_of(bag.reading(fibre), known, where)
+
+
+def trial_of(reading: Reading, known: Known, where: str) -> tuple[Trial, tuple[str, ...]]:
+    """The same of what a bag has.
+
+    Corners of length that lie between samples are put back here, so that every command simulates the same lengths.
+
+    Raises:
+        UserError: see `check_values`.
+    """
     trial, notes = complete(reading, known)
     told = "f0_n" not in reading.unknown or known.f0_n is not None or known.file_f0_n != 1.0
     lines = check_values(trial, where, told, "pca" not in reading.unknown)

@@ -9,11 +9,15 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from xb_muscle_ros.trials.spool import is_settled
+
 Array = npt.NDArray[np.float64]
 
 
 def frozen(values: npt.ArrayLike) -> Array:
-    """A read-only copy of numbers."""
+    """A read-only copy of numbers; numbers that nobody can change are taken as they are."""
+    if type(values) is np.ndarray and values.dtype == np.float64 and values.flags.c_contiguous and is_settled(values):
+        return values
     array = np.ascontiguousarray(values, dtype=np.float64).copy()
     array.setflags(write=False)
     return array
@@ -107,6 +111,20 @@ class Trial:
     def length_change_l0(self) -> Array:
         """Fibre length change relative to rest, L0, shape (n,)."""
         return self.length_m / self.facts.reference_length_m - 1.0
+
+    def length_change_at(self, time_s: Array) -> Array:
+        """The same at other times, linear between samples; looks at the samples around these times alone.
+
+        Args:
+            time_s: shape (n,), ascending, s.
+        """
+        if not time_s.size:
+            return np.empty(0)
+        first = max(int(np.searchsorted(self.time_s, time_s[0], side="right")) - 1, 0)
+        around = slice(first, int(np.searchsorted(self.time_s, time_s[-1])) + 1)
+        change = self.length_m[around] / self.facts.reference_length_m - 1.0
+        found: Array = np.interp(time_s, self.time_s[around], change)
+        return found
 
     @property
     def measured_f0(self) -> Array:

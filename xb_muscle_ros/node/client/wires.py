@@ -10,9 +10,9 @@ from typing import Any
 from rclpy.qos import QoSProfile, QoSReliabilityPolicy
 from sensor_msgs.msg import JointState
 
-from xb_muscle_ros.node.joint_state import FIELDS
 from xb_muscle_ros.node.stepping import Floats
 from xb_muscle_ros.node.traffic import Outlet, as_bytes
+from xb_muscle_ros.trials.joint_layout import FIELDS
 
 
 def reliable() -> QoSProfile:

@@ -17,7 +17,8 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bag_contents import BagContents, all_decoded, open_bag
 from xb_muscle_ros.trials.bag_files import METADATA, is_bag
-from xb_muscle_ros.trials.mcap_records import MAGIC, Message
+from xb_muscle_ros.trials.mcap_records import MAGIC
+from xb_muscle_ros.trials.messages import Messages
 from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal, begin_of
 from xb_muscle_ros.trials.readers.columns import BAG
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled
@@ -65,7 +66,7 @@ def _sqlite(path: Path, wanted: Collection[str]) -> BagContents:
         files, flaws = sqlite_parts(path), (f"{METADATA} is missing",)
         if not files:
             raise UserError(f"bag {path} has no {METADATA}; make it anew with ros2 bag reindex {path} sqlite3")
-    bag = BagContents(path, {}, {}, {}, {}, {}, None, flaws)
+    bag = BagContents(path, {}, {}, {}, {}, None, flaws)
     for file in files:
         try:
             with AnyReader([file], default_typestore=ros_types.typestore()) as reader:
@@ -75,8 +76,7 @@ def _sqlite(path: Path, wanted: Collection[str]) -> BagContents:
                         bag.definitions[each.msgtype] = (_FORMATS[each.msgdef.format], each.msgdef.data)
                 used = [each for each in reader.connections if each.topic in wanted]
                 for connection, log_ns, data in reader.messages(connections=used) if used else ():
-                    message = Message(connection.topic, log_ns, bytes(data))
-                    bag.messages.setdefault(connection.topic, []).append(message)
+                    bag.messages.setdefault(connection.topic, Messages(connection.topic)).add(log_ns, bytes(data))
         except Exception as problem:  # the library passes on what its parsers trip over
             raise UserError(f"bag {path} cannot be read: {problem}; record or convert it again") from problem
     return bag

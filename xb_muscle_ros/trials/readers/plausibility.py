@@ -71,6 +71,8 @@ def warn_of_spikes(draft: Draft, signal: Signal, values: Array, limit: float, un
         limit: what no single sample departs by, in the same unit.
         unit: its name.
     """
+    if values.size < 3 or float(np.max(np.abs(np.diff(values)))) <= limit:
+        return
     off = values[1:-1] - values[:-2], values[1:-1] - values[2:]
     found = np.flatnonzero((off[0] * off[1] > 0.0) & (np.minimum(np.abs(off[0]), np.abs(off[1])) > limit)) + 1
     if found.size:
