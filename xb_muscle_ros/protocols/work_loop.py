@@ -54,7 +54,7 @@ class WorkLoops(Protocol):
         Option("pulse-rate", (100.0,), Allowed(0.1, 2000.0, "1/s"), "of pulses while stimulated, 1/s", many=False),
         *transient_options(),
         Option("bath-pca", (0.0,), Allowed(0.0, 12.0, ""), "pCa all the time, without stimulation; 0: stimulated"),
-        Option("cycles", (8.0,), Allowed(2.0, 10_000.0, ""), "of length", many=False),
+        Option("cycles", (6.0,), Allowed(2.0, 10_000.0, ""), "of length", many=False),
         Option("stress", (0.0,), Allowed(0.0, 2000.0, "kPa"), "F0 over cross-section, kPa; 0: not known", many=False),
         rate_option(2000.0),
     )  # fmt: skip
