@@ -133,6 +133,30 @@ def test_a_force_that_is_not_linear_is_told() -> None:
     assert any("a spring of 24 F0/L0 leaves" in line for line in told)
 
 
+@pytest.mark.parametrize(("lag", "said"), [(45.0, ""), (-20.0, "other signs than Kawai's")])
+def test_three_processes_come_out_with_their_intervals(lag: float, said: str) -> None:
+    """As of a fast fibre: nothing is to be said. With three leads the signs are."""
+    rates, sizes = np.array([6.0, 80.0, 600.0]), np.array([20.0, -lag, 60.0])
+    trials = []
+    rng = np.random.default_rng(8)
+    for trial in plan(pca=4.5):
+        s = 2j * np.pi * (trial.facts.setting("frequency_hz") or 0.0)
+        modulus = 12.0 + np.sum(sizes * s / (s + rates))
+        since = trial.time_s - trial.phases_by_name()["onset"].start_s
+        force = 0.5 + 0.00125 * np.imag(modulus * np.exp(s * since)) * (since > 0.0)
+        trials.append(recorded(trial, force + 5e-4 * rng.standard_normal(force.size)))
+    told: list[str] = []
+    (found,) = xb.analyse_protocol("sinusoid", trials, tell=told.append).results
+    for letter, rate in zip("abc", rates, strict=True):
+        number = found.numbers[f"rate_{letter}_per_s"]
+        assert number.value == pytest.approx(rate, rel=0.2)
+        assert number.low is not None
+        assert number.high is not None
+        assert number.low / 1.1 < rate < number.high * 1.1
+    assert found.numbers["magnitude_b_f0_per_l0"].value == pytest.approx(lag, rel=0.2)
+    assert any(said in line for line in told) if said else told == []
+
+
 def test_a_still_recording_is_a_note() -> None:
     (trial,) = plan(pca=4.5, frequency=1.0)
     still = replace(trial, length_m=np.ones(trial.time_s.size))

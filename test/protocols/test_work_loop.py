@@ -68,7 +68,7 @@ def test_a_recording_without_settings_has_its_cycles_found() -> None:
     assert net.se < 0.1 * net.value
     assert row["frequency_hz"] == pytest.approx(1.25, rel=1e-3)
     assert row["power_f0_l0_per_s"].value == pytest.approx(1.25 * net.value, rel=1e-3)
-    assert any("found from length: 4 cycles of 1.25 Hz" in line for line in told), told
+    assert any("found from length: 6 cycles of 1.25 Hz" in line for line in told), told
 
 
 def test_what_does_not_repeat_or_move_is_a_note() -> None:

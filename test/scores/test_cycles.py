@@ -37,6 +37,23 @@ def test_several_frequencies_in_one_record_are_told_apart() -> None:
         assert begin - 1e-3 <= one.start_s[0] <= begin + 1.01 / one.frequency_hz
 
 
+def test_the_first_and_the_last_cycle_between_still_lengths_count() -> None:
+    inside = (TIME_S > 1.0) & (TIME_S < 2.5)
+    length = np.where(inside, 0.01 * np.sin(2.0 * np.pi * 4.0 * (TIME_S - 1.0)), 0.0)
+    (found,) = oscillations(TIME_S, length)
+    assert found.start_s == pytest.approx(1.0 + 0.25 * np.arange(7), abs=1e-3)
+    assert found.frequency_hz == pytest.approx(4.0, rel=1e-3)
+
+
+def test_a_cycle_of_twice_the_frequency_is_none_of_the_slower_ones() -> None:
+    faster = TIME_S >= 2.0
+    length = 0.01 * np.sin(2.0 * np.pi * np.where(faster, 4.0, 2.0) * TIME_S)
+    slow, fast = oscillations(TIME_S, length)
+    assert slow.frequency_hz == pytest.approx(2.0, rel=1e-3)
+    assert slow.start_s[-1] == pytest.approx(2.0, abs=1e-3)
+    assert fast.frequency_hz == pytest.approx(4.0, rel=1e-3)
+
+
 def test_a_still_length_and_a_ramp_have_no_cycles() -> None:
     for length in (np.zeros(TIME_S.size), np.linspace(0.0, 0.1, TIME_S.size), np.empty(0)):
         assert oscillations(TIME_S[: length.size], length) == []

@@ -15,6 +15,8 @@ NAME = "sinusoid"
 OSCILLATION = "oscillation"
 # Isometric time before, and at least so long are onset and what is read, s.
 _LEAD_S, _ONSET_S, _READ_S = 0.1, 0.6, 0.2
+# Isometric samples that tell noise.
+_QUIET = 40
 # Samples per second at least.
 _SLOWEST_RATE_HZ = 100.0
 # A model's length is straight between corners, so many of them to a sample: the harmonics that corners add to a
@@ -36,8 +38,8 @@ def oscillating(
         np.ceil(max(least_s * frequency_hz, least) - 1e-9) / frequency_hz
         for least_s, least in ((_ONSET_S, 1.0), (_READ_S, cycles))
     )
-    edges = np.cumsum([0.0, _LEAD_S, onset, read]).tolist()
     rate = max(samples_per_cycle * frequency_hz, _SLOWEST_RATE_HZ)
+    edges = np.cumsum([0.0, max(_LEAD_S, _QUIET / rate), onset, read]).tolist()
     time_s = sample_times(edges[-1], rate, f"protocol {NAME}, {frequency_hz:g} Hz")
     told = {"pca": pca, "frequency_hz": frequency_hz, "amplitude_l0": amplitude_l0}
     facts = facts_of(NAME, fibre, f"sinusoid_pca{10.0 * pca:g}_{frequency_hz:g}hz", told)
@@ -46,7 +48,7 @@ def oscillating(
     trial = Trial(
         facts=replace(facts, pca=pca, phases=phases),
         time_s=time_s,
-        length_m=1.0 + _length(time_s, amplitude_l0, frequency_hz, _LEAD_S),
+        length_m=1.0 + _length(time_s, amplitude_l0, frequency_hz, edges[1]),
         calcium_time_s=np.zeros(1),
         calcium_um=np.array([calcium_um(pca)]),
     )

@@ -118,7 +118,8 @@ class Sinusoid(Protocol):
                 at[name] = {key: Number(None, why=fit.why) for key in self.numbers}
                 continue
             at[name] = _numbers(fit, of_noise=_errors(mine) is not None)
-            notes.append(f"{name}: {_said(fit)}")
+            if said := _said(fit):
+                notes.append(f"{name}: {said}")
             fine = np.geomspace(frequency.min(), frequency.max(), 400)
             for part, values in (("elastic", fit.at(fine).real), ("viscous", fit.at(fine).imag)):
                 curves[f"{part} {name}"] = Curve(fine, values)
@@ -181,7 +182,7 @@ def _row(one: ComplexStiffness) -> Mapping[str, Cell]:
 
 def _remarks(found: Sequence[tuple[float | None, ComplexStiffness]], measured: bool) -> list[str]:
     notes = []
-    bent = [(pca, one) for pca, one in found if one.second is not None and one.second > _LINEAR]
+    bent = [(pca, one) for pca, one in found if one.second is not None and one.second > _LINEAR + 3.0 * _noisy(one)]
     if bent:
         pca, worst = max(bent, key=lambda each: each[1].second or 0.0)
         notes.append(
@@ -193,6 +194,12 @@ def _remarks(found: Sequence[tuple[float | None, ComplexStiffness]], measured: b
     if lacking:
         notes.append(f"no standard error at {lacking} frequencies: no quiet time to take noise from, under 4 cycles")
     return notes
+
+
+def _noisy(one: ComplexStiffness) -> float:
+    """Noise as a share of force's first harmonic: that of the second is like it."""
+    size, se = one.magnitude.value, one.magnitude.se
+    return se / size if size and se else 0.0
 
 
 def _at(pca: float | None) -> str:
@@ -208,14 +215,12 @@ def _errors(found: Sequence[ComplexStiffness]) -> Any:
 
 
 def _said(fit: Processes) -> str:
-    """How many processes, and why no more."""
+    """Why there are fewer than three processes, or that their signs are not Kawai's; empty where all is as his."""
     names = ", ".join(process.name for process in fit.processes)
     count = len(fit.processes)
-    if count == 3:
-        return "processes A, B and C" + (
-            "" if all(process.magnitude > 0.0 for process in fit.processes) else
-            "; their signs are not those of Kawai's (a lead, a lag, a lead)"
-        )  # fmt: skip
+    if count == len(_LETTERS):
+        usual = all(process.magnitude > 0.0 for process in fit.processes)
+        return "" if usual else f"processes {names} have other signs than Kawai's (a lead, a lag, a lead)"
     alone = "; whether it is A or C one alone does not tell" if names == "C" else ""
     return f"{count} process{'es' * (count > 1)} ({names}), no {'second' if count == 1 else 'third'}: {fit.why}{alone}"
 

@@ -48,13 +48,13 @@ class WorkLoops(Protocol):
         Option("frequency", (0.5, 1.0, 2.0, 3.0, 5.0), Allowed(0.01, 1000.0, "Hz"), "of the cycles of length, Hz"),
         Option("amplitude", (0.05,), Allowed(0.0, 0.25, "L0", True, ": amplitudes are in L0, {percent}"),
                "of the sinusoid about its middle, L0"),
-        Option("phase", (-0.05,), Allowed(-1.0, 1.0, ""),
+        Option("phase", (-0.1,), Allowed(-1.0, 1.0, ""),
                "begin of stimulation after the longest length, as a share of the cycle (negative: before)"),
-        Option("duty", (0.3,), Allowed(0.0, 1.0, ""), "share of the cycle that is stimulated; 0: one pulse"),
+        Option("duty", (0.4,), Allowed(0.0, 1.0, ""), "share of the cycle that is stimulated; 0: one pulse"),
         Option("pulse-rate", (100.0,), Allowed(0.1, 2000.0, "1/s"), "of pulses while stimulated, 1/s", many=False),
         *transient_options(),
         Option("bath-pca", (0.0,), Allowed(0.0, 12.0, ""), "pCa all the time, without stimulation; 0: stimulated"),
-        Option("cycles", (8.0,), Allowed(2.0, 10_000.0, ""), "of length", many=False),
+        Option("cycles", (6.0,), Allowed(2.0, 10_000.0, ""), "of length", many=False),
         Option("stress", (0.0,), Allowed(0.0, 2000.0, "kPa"), "F0 over cross-section, kPa; 0: not known", many=False),
         rate_option(2000.0),
     )  # fmt: skip
@@ -183,6 +183,7 @@ class WorkLoops(Protocol):
         loops.set(xlabel="length change (% L$_0$)", ylabel="force (F$_0$)")
         power.set(xlabel="cycle frequency (Hz)", ylabel="power (10$^{-3}$ F$_0$·L$_0$/s)")
         cycles.set(xlabel="cycle", ylabel="net work (10$^{-3}$ F$_0$·L$_0$)")
+        power.margins(y=0.2)
         legend(power)
         lettered([loops, power, cycles])
 
@@ -205,7 +206,7 @@ def _cycles(run: Run) -> tuple[list[Array], list[str]]:
 
 
 def _frequency(edges: Array) -> float:
-    return float((edges.size - 1) / (edges[-1] - edges[0]))
+    return float(f"{(edges.size - 1) / (edges[-1] - edges[0]):.9g}")
 
 
 def _row(run: Run, edges: Array, works: list[Work]) -> Mapping[str, Cell]:

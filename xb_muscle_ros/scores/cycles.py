@@ -15,6 +15,9 @@ _TURN = 0.25
 # Cycles belong together if period and range differ by no more than these shares from those of the first of them.
 _PERIOD, _RANGE = 0.1, 0.3
 _FEWEST = 2
+# Two cycles are the same if lengths, at so many places, are apart by no more than this share of the range (root mean
+# square).
+_COMPARED, _SHAPE = 50, 0.05
 # A frequency is sought so often, and to this share.
 _STEPS, _CLOSE = 20, 1e-10
 
@@ -87,10 +90,28 @@ def oscillations(time_s: Array, length_l0: Array) -> list[Oscillation]:
         while end < periods.size and _alike(periods[end], periods[k], _PERIOD) and _alike(by[end + 1], by[k], _RANGE):
             end += 1
         if end - k >= _FEWEST:
-            starts = times[k : end + 1]
+            starts = _extended(time_s, length_l0, times[k : end + 1], float(by[k]))
             found.append(Oscillation(starts, best_frequency(time_s, length_l0, starts)))
         k = max(end, k + 1)
     return found
+
+
+def _extended(time_s: Array, length_l0: Array, start_s: Array, by_l0: float) -> Array:
+    """The same with a cycle more at either end, where length goes as in the next: a record's first or last one.
+
+    Such a cycle has no shortest length before it, or no longest one after it, because length stood still.
+    """
+    period = float(start_s[-1] - start_s[0]) / (start_s.size - 1)
+    shares = np.linspace(0.0, 1.0, _COMPARED)
+    for side, beside_s in ((-1, start_s[0]), (1, start_s[-2])):
+        edge_s = start_s[0] - period if side < 0 else start_s[-1] + period
+        if not time_s[0] <= edge_s <= time_s[-1]:
+            continue
+        begin_s = min(edge_s, edge_s - side * period)
+        one, other = (np.interp(begin + period * shares, time_s, length_l0) for begin in (begin_s, beside_s))
+        if float(np.sqrt(np.mean((one - other) ** 2))) < _SHAPE * by_l0:
+            start_s = np.insert(start_s, 0 if side < 0 else start_s.size, edge_s)
+    return start_s
 
 
 def _alike(one: float, other: float, share: float) -> bool:

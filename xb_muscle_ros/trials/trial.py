@@ -30,7 +30,7 @@ class Phase:
     Attributes:
         name: ``isometric``, ``conditioning_stretch``, ``shortening``, ``recovery``, ``test_stretch`` or ``hold``;
             records that are not the paper's protocol use ``stretch`` and ``release`` (a quick shortening) as well,
-            and ``clamp`` where force is held in place of length.
+            and ``clamp`` where force is held in place of length. Protocols add their own (``oscillation``, ``cycles``).
         start_s: begin, in the trial's own time, s.
         end_s: end, s; not before ``start_s``.
     """
