@@ -16,7 +16,7 @@ from xb_muscle_ros import fast_yaml
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bag_files import METADATA
-from xb_muscle_ros.trials.bag_writing import ROS_DISTRO, BagWriter
+from xb_muscle_ros.trials.bag_writer import ROS_DISTRO, BagWriter
 
 
 class LiveBag:
