@@ -15,6 +15,7 @@ _HOMES = {
     "api.evaluating": ("EvaluationResult", "evaluate"),
     "api.fitting": ("FitResult", "fit"),
     "api.inputs": ("read_trials", "write_trials"),
+    "api.inspecting": ("InspectionResult", "inspect"),
     "api.making": ("make_trial",),
     "api.protocols": ("ProtocolResult", "analyse_protocol", "run_protocol"),
     "api.replaying": ("ReplayResult", "replay"),

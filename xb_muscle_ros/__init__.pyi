@@ -8,6 +8,8 @@ from xb_muscle_ros.api.fitting import FitResult as FitResult
 from xb_muscle_ros.api.fitting import fit as fit
 from xb_muscle_ros.api.inputs import read_trials as read_trials
 from xb_muscle_ros.api.inputs import write_trials as write_trials
+from xb_muscle_ros.api.inspecting import InspectionResult as InspectionResult
+from xb_muscle_ros.api.inspecting import inspect as inspect
 from xb_muscle_ros.api.making import make_trial as make_trial
 from xb_muscle_ros.api.protocols import ProtocolResult as ProtocolResult
 from xb_muscle_ros.api.protocols import analyse_protocol as analyse_protocol

@@ -13,7 +13,6 @@ from xb_muscle_ros.trials.readers.units import KINDS, UNITS
 
 if TYPE_CHECKING:
     from xb_muscle_ros.trials.readers.settings import ImportSettings
-    from xb_muscle_ros.trials.trial import Trial
 
 # Names of the readers; the readers themselves take time to load.
 FORMATS = ("bag", "csv", "mat", "slc", "xlsx")
@@ -95,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
         UserError: a mapping or an option is wrong, or with ``--strict`` anything is.
     """
     from xb_muscle_ros.progress import Progress
-    from xb_muscle_ros.trials.importing import Failed, FileDone, Kept, find_recordings, import_recordings
+    from xb_muscle_ros.trials.importing import Failed, FileDone, Kept, find_recordings, import_recordings, line_of
 
     settings = _settings(args)
     files = find_recordings(args.files, args.out)
@@ -114,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
                 progress.write(f"{event.bag}: kept, made of the same file with the same mapping")
             else:
                 imported += 1
-                progress.write(_line(event.bag, event.trial))
+                progress.write(f"{event.bag}: {line_of(event.trial)}")
                 for warning in event.trial.warnings:
                     progress.write(f"  warning: {warning}")
     print(f"{imported} imported, {kept} kept, {failed} left out")
@@ -138,22 +137,3 @@ def _settings(args: argparse.Namespace) -> ImportSettings:
             branch = branch.setdefault(part, {})
         branch[name] = value
     return ImportSettings(tree, where, args.format, args.isometric_scaling, overrides)
-
-
-def _line(bag: Path, trial: Trial) -> str:
-    """One line on an imported trial."""
-    facts = trial.facts
-    parts = [
-        f"{trial.time_s.size} samples",
-        f"{trial.time_s[-1] - trial.time_s[0]:.3f} s",
-        "pCa changes" if facts.pca is None else f"pCa {facts.pca:g}",
-        f"L0 {facts.reference_length_m:.6g} m",
-    ]
-    if facts.amplitude_l0 is not None:
-        parts.append(f"amplitude {100.0 * facts.amplitude_l0:g} % L0")
-    if facts.recovery_s is not None:
-        parts.append(f"recovery {facts.recovery_s:g} s")
-    if trial.force_n.size:
-        parts.append(f"force {trial.measured_f0.min():.3f} to {trial.measured_f0.max():.3f} F0")
-    parts.append(" ".join(f"{phase.name}@{phase.start_s:.4f}" for phase in facts.phases))
-    return f"{bag}: {', '.join(parts)}"

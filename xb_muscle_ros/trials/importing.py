@@ -95,6 +95,25 @@ def import_recordings(
         yield FileDone(path)
 
 
+def line_of(trial: Trial) -> str:
+    """One line on an imported trial."""
+    facts = trial.facts
+    parts = [
+        f"{trial.time_s.size} samples",
+        f"{trial.time_s[-1] - trial.time_s[0]:.3f} s",
+        "pCa changes" if facts.pca is None else f"pCa {facts.pca:g}",
+        f"L0 {facts.reference_length_m:.6g} m",
+    ]
+    if facts.amplitude_l0 is not None:
+        parts.append(f"amplitude {100.0 * facts.amplitude_l0:g} % L0")
+    if facts.recovery_s is not None:
+        parts.append(f"recovery {facts.recovery_s:g} s")
+    if trial.force_n.size:
+        parts.append(f"force {trial.measured_f0.min():.3f} to {trial.measured_f0.max():.3f} F0")
+    parts.append(" ".join(f"{phase.name}@{phase.start_s:.4f}" for phase in facts.phases))
+    return ", ".join(parts)
+
+
 def bag_name(data_set: str, trial: str) -> str:
     """Name of a trial's bag: ``<data set>_<trial>``, in characters every file system and shell takes.
 

@@ -12,8 +12,10 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.columns import FILE
+from xb_muscle_ros.trials.readers.contents import Content, Contents
 from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.readers.left_out import Told
+from xb_muscle_ros.trials.readers.mapping import build_mapping
 from xb_muscle_ros.trials.trial import Array
 
 _BEGIN_BYTES = 4096
@@ -189,6 +191,43 @@ class Reader(abc.ABC):
             UserError: the file cannot be read.
         """
         return mapping.facts_of(path)["pca"]
+
+    def contents(self, path: Path) -> Contents:
+        """What is in a file, for people and for `inspecting`; here the signals of its first trial, by the defaults.
+
+        Raises:
+            UserError: the file cannot be read; the format's defaults do not name its signals.
+        """
+        mapping = build_mapping({"fibre": "{file}", **self.defaults}, f"defaults of {self.name}", self.kind)
+        pending = list(self.trials(path, mapping))
+        if not pending:
+            raise UserError(f"{path} holds no measured trial; give another file")
+        recording = pending[0].read()
+        signals = [
+            self.told(key, column.name, signal.values, column.field, signal.times, signal.at)
+            for key, column in mapping.columns.items()
+            for signal in [recording.signals[key]]
+        ]
+        facts = {name: f"{value:g}" for name, value in recording.facts.items() if value is not None}
+        return Contents(
+            self.name, tuple(signals), tuple(each.trial for each in pending), facts, recording.notes, recording.warnings
+        )
+
+    def told(
+        self,
+        role: str,
+        name: str,
+        values: Array,
+        field: str = "",
+        times_s: Array | None = None,
+        at: Callable[[int], str] = "sample {}".format,
+    ) -> Content:
+        """A signal whose role and unit the format's defaults tell."""
+        keys = dict(self.defaults["columns"][role])
+        unit = keys.pop("unit", "s")
+        for key in ("column", "topic", "field", "stamp"):
+            keys.pop(key, None)
+        return Content(name, values, unit, field, role, told_more=keys, times_s=times_s, at=at)
 
 
 def begin_of(path: Path) -> bytes:

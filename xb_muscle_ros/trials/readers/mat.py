@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal
+from xb_muscle_ros.trials.readers.contents import Contents
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled
 from xb_muscle_ros.trials.trial import Array
 
@@ -75,6 +76,23 @@ class MatReader(Reader):
 
     def pca(self, path: Path, mapping: ImportMapping) -> None:
         """None: a file holds several."""
+
+    def contents(self, path: Path) -> Contents:
+        """The signals of the first measured cell, and all variables of the file."""
+        from scipy.io import whosmat
+
+        others: tuple[str, ...] = ()
+        try:
+            others = tuple(f"variable '{name}': {kind}, {' x '.join(map(str, n))}" for name, n, kind in whosmat(path))
+            return replace(super().contents(path), format="MATLAB, before version 7.3", others=others)
+        except UserError as problem:
+            if not others:
+                raise
+            return Contents("MATLAB, before version 7.3", (), others=others, notes=(str(problem),))
+        except Exception as problem:  # SciPy passes on whatever its parser trips over
+            raise UserError(
+                f"{path} cannot be read as MATLAB file ({problem}); save it with save(..., '-v7')"
+            ) from None
 
 
 def _recording(data: _Data, mapping: ImportMapping, cell: Cell, name: str) -> Recording:

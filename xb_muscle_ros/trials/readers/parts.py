@@ -13,6 +13,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.readers.side_by_side import Aside, columns_of
 from xb_muscle_ros.trials.readers.table import Indices, Table
+from xb_muscle_ros.trials.trial import Array
 
 # A column of this name tells trials apart without being asked for.
 TRIAL_COLUMN = "trial"
@@ -121,7 +122,15 @@ def _again(texts: npt.NDArray[np.str_], blocks: list[Indices]) -> str:
 def _by_time(table: Table, mapping: ImportMapping, column: str) -> tuple[list[tuple[str, Indices]], str] | None:
     if mapping.rate_hz is not None or mapping.time.pattern is not None:
         return None
-    time, _ = table.times(column, np.arange(len(table.rows)))
+    bounds = bounds_of_runs(table.times(column, np.arange(len(table.rows)))[0])
+    if bounds is None:
+        return None
+    parts = _numbered(bounds)
+    return parts, f"time starts anew in {table.place(bounds[1])}; the table is {len(parts)} trials"
+
+
+def bounds_of_runs(time: Array) -> list[int] | None:
+    """Where runs of time that starts anew begin, and the end; None where it does not, or is a clock that steps back."""
     steps = np.diff(time)
     anew = np.flatnonzero(steps <= 0.0) + 1
     if not anew.size or not (steps > 0.0).any():
@@ -130,8 +139,7 @@ def _by_time(table: Table, mapping: ImportMapping, column: str) -> tuple[list[tu
     bounds = [0, *anew.tolist(), time.size]
     if np.any(np.abs(time[anew] - time[0]) > _SAME_START_STEPS * step) or np.min(np.diff(bounds)) < _LEAST_SAMPLES:
         return None  # a clock that steps back; the trial is refused when it is read
-    parts = _numbered(bounds)
-    return parts, f"time starts anew in {table.place(bounds[1])}; the table is {len(parts)} trials"
+    return bounds
 
 
 def _ended(table: Table, aside: Aside, rows: Indices) -> tuple[Indices, str]:

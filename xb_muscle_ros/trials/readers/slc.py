@@ -19,6 +19,7 @@ import numpy as np
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal
 from xb_muscle_ros.trials.readers.cells import number
+from xb_muscle_ros.trials.readers.contents import Content, Contents
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled, name_of
 from xb_muscle_ros.trials.trial import Array
 
@@ -169,7 +170,7 @@ def _header(path: Path, lines: list[str]) -> SlcHeader:
         elif ":" in line and tag != "_RECORD_TIME_":
             name, _, value = line.partition(":")
             values[name.strip()] = value.strip()
-        elif line:
+        elif line and not line.startswith("_"):
             recorded = line if tag == "_RECORD_TIME_" else recorded
         tag = line if line.startswith("_") else tag
     return SlcHeader(path, info, values, recorded, len(lines))
@@ -211,6 +212,24 @@ class SlcReader(Reader):
     def pca(self, path: Path, mapping: ImportMapping) -> float | None:
         """As the header tells."""
         return _facts(read_header(path), mapping)["pca"]
+
+    def contents(self, path: Path) -> Contents:
+        """All channels, those that the header calibrates in their units, and what the header tells."""
+        header = read_header(path)
+        columns = read_columns(header)
+        channels = {"time": columns["time"], **_calibrated(header, columns)}
+        roles = {keys["column"]: role for role, keys in self.defaults["columns"].items()}
+
+        def at(i: int) -> str:
+            return f"line {header.lines + i + 1}"
+
+        signals = [
+            self.told(roles[name], name, values, at=at) if name in roles else Content(name, values, "V", at=at)
+            for name, values in channels.items()
+        ]
+        form = f"SLControl, {len(channels) - 1} channels, recorded {header.recorded or 'at no noted time'}"
+        noted = {name: text for name, text in {**header.info, **header.values}.items() if text not in ("", "NaN")}
+        return Contents(form, tuple(signals), facts=noted, notes=_rate_warning(header, columns["time"]))
 
 
 def _recording(path: Path, mapping: ImportMapping) -> Recording:

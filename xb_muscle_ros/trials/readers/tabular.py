@@ -12,12 +12,14 @@ import numpy as np
 
 from xb_muscle_ros.trials.readers import blanks
 from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal
+from xb_muscle_ros.trials.readers.contents import Contents
 from xb_muscle_ros.trials.readers.description import FACTS, ImportMapping, fact_of, filled
 from xb_muscle_ros.trials.readers.left_out import Told, is_left_out, told_by, wanted_by
-from xb_muscle_ros.trials.readers.options import TableOptions, read_options, wanted
+from xb_muscle_ros.trials.readers.options import DEFAULTS, TableOptions, read_options, wanted
 from xb_muscle_ros.trials.readers.parts import Part, parts_of
 from xb_muscle_ros.trials.readers.pca_columns import check_pca
 from xb_muscle_ros.trials.readers.table import Table
+from xb_muscle_ros.trials.readers.table_contents import table_contents
 from xb_muscle_ros.trials.readers.tree import Keys
 from xb_muscle_ros.trials.readers.units import UNITS, unit_in
 from xb_muscle_ros.trials.trial import Array
@@ -58,6 +60,10 @@ class TableReader(Reader):
             return Told()
         options = read_options(Keys(tree, "mapping"), FACTS)._replace(wanted=wanted_by(tree))
         return told_by(next(self.tables(path, options)), tree)
+
+    def contents(self, path: Path) -> Contents:
+        """The columns of the first table."""
+        return table_contents(path, self.tables(path, DEFAULTS))
 
     def pca(self, path: Path, mapping: ImportMapping) -> float | None:
         """As the file's name or the mapping tells; None where a column does."""

@@ -1,0 +1,50 @@
+"""Facts of a trial that stand in the names of files: pCa, and amplitude and recovery of the paper's protocol."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from xb_muscle_ros.trials.readers.calcium import PCA_RANGE
+from xb_muscle_ros.trials.readers.description import name_of
+
+
+class NamePattern(NamedTuple):
+    """A regular expression for ``file_name.pattern``, its factors, and what it reads in the first name."""
+
+    pattern: str
+    factors: dict[str, float]
+    found: dict[str, float]
+
+
+# Patterns by order of how much they tell; factors for numbers that are written without their point.
+_PATTERNS: tuple[tuple[str, dict[str, float]], ...] = (
+    (
+        r"amp(?P<amplitude_l0>\d+)_rt(?P<recovery_s>\d+)ms_pca(?P<pca>\d+)",
+        {"amplitude_l0": 1e-4, "recovery_s": 1e-3, "pca": 0.1},
+    ),
+    (r"[pP][cC][aA][ _=-]?(?P<pca>\d{1,2}\.\d+)", {}),
+    (r"[pP][cC][aA][ _=-]?(?P<pca>\d)(?!\d|\.\d)", {}),
+    (r"[pP][cC][aA][ _=-]?(?P<pca>\d{2})(?!\d|\.\d)", {"pca": 0.1}),
+    (r"(?<!\d)(?P<pca>\d{2})[pP][cC][aA]", {"pca": 0.1}),
+)
+
+
+def name_pattern(paths: Sequence[Path]) -> NamePattern | None:
+    """The first pattern that all names have, with a pCa that is one; None where there is none."""
+    for pattern, factors in _PATTERNS:
+        found = [_found(pattern, factors, name_of(path)) for path in paths]
+        if found and all(each is not None for each in found):
+            assert found[0] is not None  # all of them are
+            return NamePattern(pattern, factors, found[0])
+    return None
+
+
+def _found(pattern: str, factors: dict[str, float], name: str) -> dict[str, float] | None:
+    match = re.search(pattern, name)
+    if match is None:
+        return None
+    values = {key: float(f"{float(text) * factors.get(key, 1.0):.12g}") for key, text in match.groupdict().items()}
+    return values if PCA_RANGE[0] <= values["pca"] <= PCA_RANGE[1] else None
