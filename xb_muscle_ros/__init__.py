@@ -13,6 +13,7 @@ __version__ = "0.2.0"
 _HOMES = {
     "api.diagnosing": ("DiagnosisResult", "diagnose"),
     "api.evaluating": ("EvaluationResult", "evaluate"),
+    "api.exporting": ("export_trials",),
     "api.fitting": ("FitResult", "fit"),
     "api.inputs": ("read_trials", "write_trials"),
     "api.inspecting": ("InspectionResult", "inspect"),

@@ -4,6 +4,7 @@ from xb_muscle_ros.api.diagnosing import DiagnosisResult as DiagnosisResult
 from xb_muscle_ros.api.diagnosing import diagnose as diagnose
 from xb_muscle_ros.api.evaluating import EvaluationResult as EvaluationResult
 from xb_muscle_ros.api.evaluating import evaluate as evaluate
+from xb_muscle_ros.api.exporting import export_trials as export_trials
 from xb_muscle_ros.api.fitting import FitResult as FitResult
 from xb_muscle_ros.api.fitting import fit as fit
 from xb_muscle_ros.api.inputs import read_trials as read_trials

@@ -19,6 +19,8 @@ COMMANDS = {
     "import": "make bags of recordings in CSV, MATLAB, SLControl or other bags",
     "record": "record live topics into a bag",
     "simulate": "simulate trials of a protocol into bags, and read them off",
+    "export": "write trials of bags as CSV, Parquet or OpenSim tables",
+    "simulate": "simulate stretch-shorten-stretch trials into bags",
     "replay": "replay bags through the model and compare forces",
     "evaluate": "score models against recordings, and set them beside the paper",
     "fit": "estimate a fibre's parameters from recordings",

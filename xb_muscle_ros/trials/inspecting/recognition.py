@@ -186,12 +186,15 @@ def _one_of_the_same(found: Recognition, role: str, candidates: list[Recognised]
         return candidates
     scale = factor * UNITS[absolute[0].unit].factor / UNITS[relative[0].unit].factor
     found.factors[role] = scale
-    found.taken_for[relative[0].content.label] = f"is '{absolute[0].content.label}' in another unit"
+    # 1 m for L0 is how normalised lengths are kept: those are in L0.
+    normalised = role == "length" and abs(scale - 1.0) <= _SAME
+    kept, other = (relative[0], absolute[0]) if normalised else (absolute[0], relative[0])
+    found.taken_for[other.content.label] = f"is '{kept.content.label}' in another unit"
     found.remarks.append(
         f"'{relative[0].content.label}' is '{absolute[0].content.label}' in another unit: "
         f"{'L0' if role == 'length' else 'F0'} is {factor:.9g} {absolute[0].unit}"
     )
-    return absolute
+    return [kept]
 
 
 def _slope(

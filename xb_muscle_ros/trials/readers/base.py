@@ -204,7 +204,7 @@ class Reader(abc.ABC):
             raise UserError(f"{path} holds no measured trial; give another file")
         recording = pending[0].read()
         signals = [
-            self.told(key, column.name, signal.values, column.field, signal.times, signal.at)
+            self.content_of(key, column.name, signal.values, column.field, signal.times, signal.at)
             for key, column in mapping.columns.items()
             for signal in [recording.signals[key]]
         ]
@@ -213,7 +213,7 @@ class Reader(abc.ABC):
             self.name, tuple(signals), tuple(each.trial for each in pending), facts, recording.notes, recording.warnings
         )
 
-    def told(
+    def content_of(
         self,
         role: str,
         name: str,

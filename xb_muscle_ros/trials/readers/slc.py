@@ -224,7 +224,7 @@ class SlcReader(Reader):
             return f"line {header.lines + i + 1}"
 
         signals = [
-            self.told(roles[name], name, values, at=at) if name in roles else Content(name, values, "V", at=at)
+            self.content_of(roles[name], name, values, at=at) if name in roles else Content(name, values, "V", at=at)
             for name, values in channels.items()
         ]
         form = f"SLControl, {len(channels) - 1} channels, recorded {header.recorded or 'at no noted time'}"
