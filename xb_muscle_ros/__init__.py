@@ -18,6 +18,7 @@ _HOMES = {
     "api.inputs": ("read_trials", "write_trials"),
     "api.inspecting": ("InspectionResult", "inspect"),
     "api.making": ("make_trial",),
+    "api.new_fibre": ("new_fibre",),
     "api.protocols": ("ProtocolResult", "analyse_protocol", "run_protocol"),
     "api.replaying": ("ReplayResult", "replay"),
     "api.simulating": ("SimulationResult", "simulate"),

@@ -12,6 +12,7 @@ from xb_muscle_ros.api.inputs import write_trials as write_trials
 from xb_muscle_ros.api.inspecting import InspectionResult as InspectionResult
 from xb_muscle_ros.api.inspecting import inspect as inspect
 from xb_muscle_ros.api.making import make_trial as make_trial
+from xb_muscle_ros.api.new_fibre import new_fibre as new_fibre
 from xb_muscle_ros.api.protocols import ProtocolResult as ProtocolResult
 from xb_muscle_ros.api.protocols import analyse_protocol as analyse_protocol
 from xb_muscle_ros.api.protocols import run_protocol as run_protocol

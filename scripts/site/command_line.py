@@ -18,7 +18,7 @@ def reference() -> str:
 def _commands(parser: argparse.ArgumentParser) -> Iterator[tuple[str, argparse.ArgumentParser]]:
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
-            for made in action.choices.values():
+            for made in dict.fromkeys(action.choices.values()):  # a command has one section, whatever its aliases
                 yield made.prog, made
 
 

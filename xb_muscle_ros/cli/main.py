@@ -20,9 +20,9 @@ COMMANDS = {
     "record": "record live topics into a bag",
     "simulate": "simulate trials of a protocol into bags, and read them off",
     "export": "write trials of bags as CSV, Parquet or OpenSim tables",
-    "simulate": "simulate stretch-shorten-stretch trials into bags",
     "replay": "replay bags through the model and compare forces",
     "evaluate": "score models against recordings, and set them beside the paper",
+    "fibre": "write a fibre file to start from",
     "fit": "estimate a fibre's parameters from recordings",
     "diagnose": "say what physics a simulation left out of recordings",
     "prove": "test diagnoses blind: conceal effects, diagnose, score",
@@ -31,6 +31,9 @@ COMMANDS = {
     "parameters": "list parameters with unit, range and meaning",
 }
 """Each is a module ``<name>_command`` of this folder: ``DESCRIPTION``, ``add_arguments`` and ``run``."""
+
+ALIASES = {"fiber": "fibre"}
+"""Other names of commands."""
 
 
 def build_parser(command: str | None = None) -> argparse.ArgumentParser:
@@ -48,7 +51,11 @@ def build_parser(command: str | None = None) -> argparse.ArgumentParser:
             continue
         module = importlib.import_module(f"xb_muscle_ros.cli.{name}_command")
         parser = subparsers.add_parser(
-            name, help=text, description=module.DESCRIPTION, epilog=getattr(module, "EPILOG", None)
+            name,
+            aliases=[other for other, known in ALIASES.items() if known == name],
+            help=text,
+            description=module.DESCRIPTION,
+            epilog=getattr(module, "EPILOG", None),
         )
         module.add_arguments(parser)
         parser.set_defaults(run=getattr(module, "run", None))
@@ -59,7 +66,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; returns its exit code. What a user can mend is one line on stderr and code 2."""
     try:
         given = sys.argv[1:] if argv is None else argv
-        arguments = build_parser(next((each for each in given if each in COMMANDS), None)).parse_args(argv)
+        arguments = build_parser(
+            next((ALIASES.get(each, each) for each in given if each in (*COMMANDS, *ALIASES)), None)
+        ).parse_args(argv)
         with warnings.catch_warnings():
             warnings.showwarning = functools.partial(_show, warnings.showwarning)
             return int(arguments.run(arguments))

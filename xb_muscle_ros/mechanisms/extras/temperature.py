@@ -6,7 +6,7 @@ _SOURCE = "Ranatunga 1996; this package"
 OFFSET = Parameter("warmer", "K", "temperature above that of the parameter set", -30.0, 30.0, 0.0, _SOURCE)
 Q10 = Parameter("q10", "1", "factor of all rates per 10 K", 0.5, 10.0, 2.5, _SOURCE)
 # Rates per second, and velocities; what a model does not have is left out.
-_RATES = ("kon", "koff", "J1", "J2", "f", "k11", "k21", "k", "b", "vmax")
+RATES = ("kon", "koff", "J1", "J2", "f", "k11", "k21", "k", "b", "vmax")
 
 
 class Temperature(Extra):
@@ -21,4 +21,4 @@ class Temperature(Extra):
 
     def modified(self, q: Quantities) -> Values:
         factor = q.q10 ** (q.warmer / 10)
-        return {name: getattr(q, name) * factor for name in _RATES if name in q}
+        return {name: getattr(q, name) * factor for name in RATES if name in q}
