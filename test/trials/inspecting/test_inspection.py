@@ -149,6 +149,22 @@ def test_units_below_the_header_are_read_and_told(tmp_path: Path) -> None:
     assert "line 2 holds units" in report(found)
 
 
+def test_a_workbook_is_inspected_as_a_table_is(tmp_path: Path) -> None:
+    from openpyxl import Workbook
+
+    book = Workbook()
+    sheet = book.active
+    sheet.append(["Time (s)", "Length (mm)", "Force (mN)"])
+    for row in zip(TIME_S.tolist(), LENGTH_MM.tolist(), FORCE_MN.tolist(), strict=True):
+        sheet.append(row)
+    book.save(tmp_path / "a_pCa6.xlsx")
+    found = inspect_file(tmp_path / "a_pCa6.xlsx")
+    assert {role: one.unit for role, one in found.recognition.roles.items()} == {
+        "time": "s", "length": "mm", "force": "mN",
+    }  # fmt: skip
+    assert [line.partition(":")[0] for line in found.proposal.missing] == ["f0"]
+
+
 def test_files_of_one_layout_share_a_mapping_and_keep_what_each_tells(tmp_path: Path) -> None:
     columns = {"time_s": TIME_S, "length_mm": LENGTH_MM, "force_mN": FORCE_MN}
     files = [

@@ -39,7 +39,7 @@ def table_contents(path: Path, tables: Iterator[Table]) -> Contents:
             others.append(_text_column(name, texts))
             continue
         lines = [rows.number(row) for row in range(len(rows))]
-        unit = table.units[i] if table.units and not read_name(name).unit else ""
+        unit = table.units[i].strip("()[] ") if table.units and not read_name(name).unit else ""
         columns.append(Content(name, values, unit, faults=tuple(_faults(texts, values, lines)), at=table.place))
     others += [f"{more.where} is a table as well; its signals are not shown" for more in tables]
     mark = "comma" if table.decimal == COMMA else "point"
