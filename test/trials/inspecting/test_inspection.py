@@ -150,9 +150,7 @@ def test_units_below_the_header_are_read_and_told(tmp_path: Path) -> None:
 
 
 def test_a_workbook_is_inspected_as_a_table_is(tmp_path: Path) -> None:
-    from openpyxl import Workbook
-
-    book = Workbook()
+    book = pytest.importorskip("openpyxl").Workbook()
     sheet = book.active
     sheet.append(["Time (s)", "Length (mm)", "Force (mN)"])
     for row in zip(TIME_S.tolist(), LENGTH_MM.tolist(), FORCE_MN.tolist(), strict=True):
