@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -84,3 +85,35 @@ def test_a_short_record_is_refused() -> None:
     trial = xb.StretchShortenStretch(0.0, 0.0).trial("soleus", 6.1)
     with pytest.raises(UserError, match=r"lasts 0\.284 s; a notch of 2 Hz needs 1\.5 s"):
         notched(trial, [50.0])
+
+
+def test_import_tells_of_hum_and_takes_it_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from xb_muscle_ros.cli.main import main
+
+    trial = recorded(50.02, 0.02)
+    table = np.column_stack([trial.time_s, 30.0 * (1.0 + trial.length_change_l0), 20.0 * trial.force_n])
+    file = tmp_path / "ramp.csv"
+    np.savetxt(file, table, delimiter=",", header="time_s,length_mm,force_mN", comments="")
+    options = ["--fiber", "soleus", "--pca", "6.1", "--time-column", "time_s", "--time-unit", "s", "--f0", "20 mN"]
+    options += [
+        "--length-column",
+        "length_mm",
+        "--length-unit",
+        "mm",
+        "--force-column",
+        "force_mN",
+        "--force-unit",
+        "mN",
+    ]
+    assert main(["import", str(file), *options, "--out", str(tmp_path / "a")]) == 0
+    assert "force has hum of 50.0 Hz with an amplitude of 2 % F0; --notch 50" in capsys.readouterr().out
+    assert main(["import", str(file), *options, "--notch", "50", "--out", str(tmp_path / "b")]) == 0
+    assert "has hum" not in capsys.readouterr().out
+    (before,) = xb.read_trials(tmp_path / "a", tell=lambda line: None)
+    (after,) = xb.read_trials(tmp_path / "b", tell=lambda line: None)
+    assert "notch at 50 Hz" in after.facts.source
+    assert after.facts.phases == before.facts.phases
+    still = after.time_s < 1.2
+    assert np.std(after.measured_f0[still]) < 0.1 * np.std(before.measured_f0[still])
+    assert main(["import", str(file), *options, "--notch", "5000", "--out", str(tmp_path / "c")]) == 2
+    assert "notch is 5000 Hz; allowed is 1 to 1000" in capsys.readouterr().err

@@ -81,6 +81,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--isometric-scaling", action=argparse.BooleanOptionalAction,
         help="scale each trial's force to the isometric trial of its pCa (default: where the mapping has the table)",
     )  # fmt: skip
+    parser.add_argument(
+        "--notch", type=float, nargs="+", metavar="HZ",
+        help="take hum of these frequencies out of length and force alike, without a shift in time: 50",
+    )  # fmt: skip
     parser.add_argument("--strict", action="store_true", help="stop at the first file or trial that cannot be imported")
 
 
@@ -136,4 +140,6 @@ def _settings(args: argparse.Namespace) -> ImportSettings:
         for part in above:
             branch = branch.setdefault(part, {})
         branch[name] = value
+    if args.notch is not None:
+        overrides["notch"] = args.notch
     return ImportSettings(tree, where, args.format, args.isometric_scaling, overrides)

@@ -76,11 +76,10 @@ def notched(trial: Trial, frequencies_hz: Sequence[float]) -> Trial:
     Raises:
         UserError: samples are not even or too few, or a frequency is none that they show.
     """
-    where = f"trial {trial.facts.trial}"
-    length = _filtered(where, "length", trial.time_s, trial.length_m, frequencies_hz)
+    length = _filtered("length", trial.time_s, trial.length_m, frequencies_hz)
     force = trial.force_n
     if trial.force_time_s.size:
-        force = _filtered(where, "force", trial.force_time_s, trial.force_n, frequencies_hz)
+        force = _filtered("force", trial.force_time_s, trial.force_n, frequencies_hz)
     told = f"notch at {', '.join(f'{hz:g}' for hz in frequencies_hz)} Hz, {WIDTH_HZ:g} Hz wide, on length and force"
     source = "; ".join(filter(None, [trial.facts.source, told]))
     return replace(trial, length_m=length, force_n=force, facts=replace(trial.facts, source=source))
@@ -97,13 +96,13 @@ def check_frequencies(frequencies_hz: Sequence[float], what: str) -> None:
             raise UserError(f"{what} is {hz:g} Hz; allowed is 1 to {_HIGHEST_HZ:g}, for example 50")
 
 
-def _filtered(where: str, what: str, time_s: Array, values: Array, frequencies_hz: Sequence[float]) -> Array:
+def _filtered(what: str, time_s: Array, values: Array, frequencies_hz: Sequence[float]) -> Array:
     if time_s.size < 2 or not _even(time_s):
-        raise UserError(f"{where}: {what} is not sampled evenly, which a notch needs; leave --notch out")
+        raise UserError(f"{what} is not sampled evenly, which a notch needs; leave --notch out")
     rate_hz = (time_s.size - 1) / float(time_s[-1] - time_s[0])
     if time_s[-1] - time_s[0] < _LONG / WIDTH_HZ:
         raise UserError(
-            f"{where}: {what} lasts {time_s[-1] - time_s[0]:.3g} s; a notch of {WIDTH_HZ:g} Hz needs "
+            f"{what} lasts {time_s[-1] - time_s[0]:.3g} s; a notch of {WIDTH_HZ:g} Hz needs "
             f"{_LONG / WIDTH_HZ:g} s; leave --notch out"
         )
     level = float(np.mean(values))
@@ -111,8 +110,7 @@ def _filtered(where: str, what: str, time_s: Array, values: Array, frequencies_h
     for hz in frequencies_hz:
         if hz >= 0.5 * rate_hz:
             raise UserError(
-                f"{where}: a notch at {hz:g} Hz needs more than {2.0 * hz:g} samples per second; {what} has "
-                f"{rate_hz:.4g}"
+                f"a notch at {hz:g} Hz needs more than {2.0 * hz:g} samples per second; {what} has {rate_hz:.4g}"
             )
         sections = tf2sos(*iirnotch(hz, hz / WIDTH_HZ, rate_hz))
         # What is the same all the time goes first: at the ends, where the filter begins, it would stay.

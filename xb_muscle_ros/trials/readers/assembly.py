@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.errors import UserError, naming
+from xb_muscle_ros.trials.mains import hum_line, notched
 from xb_muscle_ros.trials.phases import conditioning
 from xb_muscle_ros.trials.readers.base import Draft, Recording, Signal
 from xb_muscle_ros.trials.readers.calcium import PCA_RANGE, read_calcium
@@ -71,7 +73,7 @@ def trial_of(recording: Recording, mapping: ImportMapping, path: Path, isometric
         source="; ".join(text for text in draft.notes if text),
         data_set=filled(mapping.data_set, path),
     )
-    return Trial(
+    trial = Trial(
         facts=facts,
         time_s=clock.time_s,
         length_m=length.length_m,
@@ -79,8 +81,13 @@ def trial_of(recording: Recording, mapping: ImportMapping, path: Path, isometric
         calcium_um=calcium.calcium_um,
         force_time_s=force.time_s,
         force_n=force.force_n,
-        warnings=tuple(draft.warnings),
     )
+    if mapping.notch_hz:
+        with naming(draft.where):
+            trial = notched(trial, mapping.notch_hz)
+    elif line := hum_line(trial):
+        draft.warn(line)
+    return replace(trial, warnings=tuple(draft.warnings))
 
 
 def _check_facts(draft: Draft) -> None:

@@ -93,6 +93,7 @@ class ImportMapping:
         f0_at_pca: F0 is the initial isometric force of the trial at this pCa in the same folder; None where not.
         f0_note: where F0 comes from, where that was found out rather than given.
         force_zero_from_slack: force is zero while the fibre is slack after a release.
+        notch_hz: frequencies that are taken out of length and force, Hz.
         facts: those of `FACTS` that hold for every file (-log10 M, L0, s).
         file_name: finds facts in file names by its groups ``pca``, ``amplitude_l0``, ``recovery_s``.
         factors: what a number found in the file name is multiplied with.
@@ -125,6 +126,7 @@ class ImportMapping:
     f0_at_pca: float | None = None
     f0_note: str = ""
     force_zero_from_slack: bool = False
+    notch_hz: tuple[float, ...] = ()
     facts: Mapping[str, float] = field(default_factory=dict)
     file_name: re.Pattern[str] | None = None
     factors: Mapping[str, float] = field(default_factory=dict)

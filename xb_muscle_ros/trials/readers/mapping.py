@@ -15,6 +15,7 @@ import yaml
 
 from xb_muscle_ros import fast_yaml
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.mains import check_frequencies
 from xb_muscle_ros.trials.readers.columns import (
     FILE,
     SIGNALS,
@@ -30,7 +31,7 @@ from xb_muscle_ros.trials.readers.tree import Keys, check_keys
 from xb_muscle_ros.trials.readers.units import finite
 
 _NAMES = ("fibre", "trial", "data_set", "source")
-_PARTS = ("columns", "reference_length", "f0", "activation", "phases", "file_name", "isometric_scaling")
+_PARTS = ("columns", "reference_length", "f0", "activation", "phases", "file_name", "isometric_scaling", "notch")
 # Beyond these it is no muscle's F0, or its unit is wrong: a myofibril to the largest muscles, weak to strong.
 F0_RANGES = {"force": (1e-9, 1e5, "N"), "stress": (1e3, 2e6, "Pa")}
 
@@ -95,6 +96,7 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
         f0=None if f0_is_found else keys.quantity("f0", "force", "100 kPa"),
         f0_at_pca=keys.below("f0", "isometric_at_pca").number("isometric_at_pca") if f0_is_found else None,
         force_zero_from_slack=columns.below("force").choice("zero", "as_recorded", "slack") == "slack",
+        notch_hz=_notch(keys),
         facts={name: keys.number(name) for name in FACTS if name in keys},
         file_name=file_name,
         factors=factors,
@@ -105,6 +107,14 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
     for fault in itertools.chain.from_iterable(each(made) for each in faults):
         raise UserError(f"{where}: {fault}")
     return made
+
+
+def _notch(keys: Keys) -> tuple[float, ...]:
+    told = keys.values.get("notch", [])
+    each = told if isinstance(told, list) else [told]
+    found = tuple(finite(hz, "notch", keys.where) for hz in each)
+    check_frequencies(found, f"{keys.where}: notch")
+    return found
 
 
 def _name(keys: Keys, key: str, default: str) -> str:
