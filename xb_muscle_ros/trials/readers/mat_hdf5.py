@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
+import zlib
 from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
@@ -148,20 +149,37 @@ class _Reading:
     def _values(self, item: Any) -> np.ndarray[Any, Any]:
         if item.size * item.dtype.itemsize > self._most:
             raise ValueError(f"{item.name} claims {item.size} numbers, more than the file can hold")
-        if not _is_written(item):
+        if not _is_usual(item):
+            raise ValueError(f"{item.name} has numbers of an unknown type")
+        values = np.asarray(item[()])
+        if not _is_whole(item, values):
             raise ValueError(f"parts of {item.name} are not there")
-        return np.asarray(item[()])
+        return values
 
 
-def _is_written(item: Any) -> bool:
-    """Whether all of a data set is in the file: HDF5 gives zeros for parts it cannot find."""
+def _is_whole(item: Any, values: np.ndarray[Any, Any]) -> bool:
+    """Whether all of a data set is in the file: HDF5 gives zeros, without a word, for parts it does not find.
+
+    Where a part is nothing but zeros, its bytes are looked at: a damaged index may hide them from HDF5.
+    """
     if item.chunks is None:
-        stored: int = item.id.get_storage_size()
-        return bool(stored == item.size * item.id.get_type().get_size())
-    found: set[tuple[int, ...]] = set()
-    item.id.chunk_iter(lambda chunk: found.add(tuple(chunk.chunk_offset)))
-    needed = itertools.product(*(range(0, n, step) for n, step in zip(item.shape, item.chunks, strict=True)))
-    return bool(found == set(needed))
+        return bool(item.id.get_storage_size() == item.size * item.id.get_type().get_size())
+    for begin in itertools.product(*(range(0, n, step) for n, step in zip(item.shape, item.chunks, strict=True))):
+        if item.id.get_chunk_info_by_coord(begin).byte_offset is None:
+            return False
+        part = tuple(slice(at, at + step) for at, step in zip(begin, item.chunks, strict=True))
+        if values.dtype.kind in "fiu" and not values[part].any():
+            stored = item.id.read_direct_chunk(begin)[1]
+            if any(zlib.decompress(stored) if item.compression == "gzip" else stored):
+                return False
+    return True
+
+
+def _is_usual(item: Any) -> bool:
+    """Whether numbers are of a usual type: HDF5 converts any, and takes a damaged description of one for another."""
+    import h5py
+
+    return item.dtype.kind not in "fiu" or bool(h5py.h5t.py_create(item.dtype).equal(item.id.get_type()))
 
 
 def _kind(item: Any) -> str:
