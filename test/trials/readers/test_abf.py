@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyabf
 import pytest
 from abf_files import EPISODIC, GAP_FREE, VARIABLE, Input, abf1, abf2, unit_per_count
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from pyabf.abfWriter import writeABF1
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.abf_file import read_abf
@@ -23,6 +21,8 @@ from xb_muscle_ros.trials.readers.assembly import trial_of
 from xb_muscle_ros.trials.readers.registry import reader_for
 from xb_muscle_ros.trials.readers.settings import ImportSettings
 from xb_muscle_ros.trials.trial import Trial
+
+pyabf = pytest.importorskip("pyabf")  # of the extra 'files'
 
 COUNT = 400
 STEP_US = 1000.0 / 3.0  # no whole number of samples in a second, nor of us
@@ -119,7 +119,7 @@ def test_files_of_pyabf_are_read(tmp_path: Path) -> None:
     count = 10 * COUNT
     force = np.vstack([np.linspace(1.0, 5.0, count), np.linspace(2.0, 6.0, count)])
     path = tmp_path / "f.abf"
-    writeABF1(force, str(path), 1000, units="mN")
+    pyabf.abfWriter.writeABF1(force, str(path), 1000, units="mN")
     file = read_abf(path)
     assert [file.sweeps, file.channels[0].unit, file.step_s] == [((0, count), (count, 2 * count)), "mN", 1e-3]
     known = pyabf.ABF(str(path))
@@ -199,7 +199,7 @@ def test_f0_of_the_folder_is_that_of_each_files_own_unit(tmp_path: Path, write: 
 def test_old_short_headers_take_no_gain_from_the_samples(tmp_path: Path) -> None:
     counts = np.full((1, 8000), 1.0)  # every word of the samples is 1, where later headers switch a gain on
     path = tmp_path / "f.abf"
-    writeABF1(counts / 32768 * 10.0, str(path), 1000, units="mN")
+    pyabf.abfWriter.writeABF1(counts / 32768 * 10.0, str(path), 1000, units="mN")
     data = bytearray(path.read_bytes())
     data[2048:] = struct.pack("<h", 1) * ((len(data) - 2048) // 2)
     path.write_bytes(data)

@@ -8,12 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mat73 import Text, save73
+from mat73 import Text, h5py, save73
 from scipy.io import savemat
 
 from xb_muscle_ros.errors import UserError
