@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from xb_muscle_ros.trials.readers.settings import ImportSettings
 
 # Names of the readers; the readers themselves take time to load.
-FORMATS = ("bag", "csv", "mat", "slc", "xlsx")
+FORMATS = ("abf", "bag", "csv", "mat", "slc", "xlsx")
 # option: (key of the mapping and those above it, argument type, help)
 _OPTIONS: dict[str, tuple[str, type, str]] = {
     "--trial": ("trial", str, "name of the trial (default: the file's)"),

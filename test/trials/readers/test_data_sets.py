@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from xb_muscle_ros.trials.bags import find_bags, read_trial
 from xb_muscle_ros.trials.importing import Failed, FileDone, Imported, import_recordings
@@ -320,7 +321,10 @@ def test_other_files_of_the_sets_have_a_mapping_too(
     settings = ImportSettings(tree, mapping)
     for name in names:
         file = tmp_path / f"{name}{suffix}"
-        file.write_text("made for its name")
+        if suffix == ".mat":  # it tells that it is of that layout
+            savemat(file, {"data": {"pCas": [4.5]}})
+        else:
+            file.write_text("made for its name")
         prepared = settings.prepare(file)
         assert prepared.mapping.facts_of(file)["pca"] == {
             "AvgMava_pCa6.0_1s": 6.0,

@@ -153,20 +153,30 @@ class Reader(abc.ABC):
         suffixes: endings such files usually have.
         begins: what such files begin with, where that tells them.
         kind: how a mapping names signals, `columns.FILE` or `columns.BAG`.
+        takes: keys of a mapping that are for some formats alone and have a use for this one.
+        tells: whether its files tell a part of the mapping, see `told`.
         defaults: what a mapping need not say for this format; a tree as a mapping file has it.
-        takes: keys of `options.TABLE_KEYS` that it knows; those with any read tables.
     """
 
     name: str
     suffixes: tuple[str, ...]
     begins: tuple[bytes, ...] = ()
     kind: str = FILE
-    defaults: Mapping[str, Any] = {}
     takes: tuple[str, ...] = ()
+    tells: bool = False
+    defaults: Mapping[str, Any] = {}
 
     def matches(self, path: Path) -> bool:
         """Whether a file or folder is of this format, as far as its begin and its name tell."""
         return path.suffix.lower() in self.suffixes or begin_of(path).startswith(self.begins)
+
+    def told(self, path: Path, tree: Mapping[str, Any]) -> Told:
+        """What a file tells of what a mapping, given as a tree, leaves out.
+
+        Raises:
+            UserError: the file cannot be read, or does not tell it, or a unit that is not known.
+        """
+        return Told()
 
     @abc.abstractmethod
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
@@ -175,14 +185,6 @@ class Reader(abc.ABC):
         Raises:
             UserError: the file cannot be read at all.
         """
-
-    def told(self, path: Path, tree: Mapping[str, Any]) -> Told:
-        """What a file tells of what a mapping, given as a tree, leaves out.
-
-        Raises:
-            UserError: the file cannot be read, or does not tell it.
-        """
-        return Told()
 
     def pca(self, path: Path, mapping: ImportMapping) -> float | None:
         """The pCa of the trial in a file, read at little cost; None where it has none or holds several trials.

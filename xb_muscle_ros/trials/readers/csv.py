@@ -11,7 +11,7 @@ from xb_muscle_ros.trials.readers.base import begin_of
 from xb_muscle_ros.trials.readers.delimited import read_table
 from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.readers.encoding import looks_like_text
-from xb_muscle_ros.trials.readers.options import TableOptions
+from xb_muscle_ros.trials.readers.options import ANY_TABLE, TableOptions
 from xb_muscle_ros.trials.readers.table import Table
 from xb_muscle_ros.trials.readers.tabular import TableReader
 from xb_muscle_ros.trials.trial import Trial
@@ -22,7 +22,7 @@ class CsvReader(TableReader):
 
     name = "csv"
     suffixes = (".csv", ".tsv", ".lvm")
-    takes = ("decimal", "encoding", "header", "blanks")
+    takes = (*ANY_TABLE, "decimal", "encoding", "header", "blanks")
 
     def matches(self, path: Path) -> bool:
         """Whether the file is called so or holds text."""

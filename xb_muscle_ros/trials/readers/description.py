@@ -21,7 +21,7 @@ FACTS = ("pca", "amplitude_l0", "recovery_s")
 # Endings of files that tell a format and are no part of a name.
 ENDINGS = (
     *(".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
-    *(".mat", ".slc", ".mcap", ".db3"),
+    *(".mat", ".slc", ".abf", ".mcap", ".db3"),
 )
 
 

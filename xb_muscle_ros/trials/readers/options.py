@@ -14,6 +14,10 @@ from xb_muscle_ros.trials.readers.tree import Keys, check_keys
 
 # What only tables have; each reader takes some of them.
 TABLE_KEYS = ("decimal", "encoding", "header", "sheet", "blanks")
+# A column of each trial by the names of columns.
+PATTERN = "pattern"
+# What every table takes.
+ANY_TABLE = ("columns.trial", "columns.time.rate", PATTERN)
 # A table without a header.
 NO_HEADER = "none"
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.readers.abf import AbfReader
 from xb_muscle_ros.trials.readers.bag import BagReader
 from xb_muscle_ros.trials.readers.base import Reader
 from xb_muscle_ros.trials.readers.csv import CsvReader
@@ -13,7 +14,7 @@ from xb_muscle_ros.trials.readers.slc import SlcReader
 from xb_muscle_ros.trials.readers.xlsx import XlsxReader
 
 # In the order they are asked: text that is none of the others is a table.
-_ALL = (BagReader(), MatReader(), SlcReader(), XlsxReader(), CsvReader())
+_ALL = (BagReader(), MatReader(), SlcReader(), AbfReader(), XlsxReader(), CsvReader())
 READERS: dict[str, Reader] = {reader.name: reader for reader in _ALL}
 
 

@@ -7,7 +7,7 @@ import functools
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ from xb_muscle_ros.trials.readers.description import ImportMapping, name_of
 from xb_muscle_ros.trials.readers.force import Force, isometric_force
 from xb_muscle_ros.trials.readers.left_out import Told, is_left_out
 from xb_muscle_ros.trials.readers.mapping import build_mapping
-from xb_muscle_ros.trials.readers.options import TABLE_KEYS
+from xb_muscle_ros.trials.readers.options import PATTERN, TABLE_KEYS
 from xb_muscle_ros.trials.readers.registry import READERS, reader_for
 from xb_muscle_ros.trials.readers.tree import Keys, merged
 from xb_muscle_ros.trials.readers.units import Quantity
@@ -75,10 +75,10 @@ class ImportSettings:
         self.isometric_scaling = isometric_scaling
         self._merged = functools.lru_cache(_KEPT)(self._merge)
         self._mapping = functools.lru_cache(_KEPT)(self._built)
-        self._isometric_f0 = functools.lru_cache(_KEPT)(isometric_f0)
+        self._isometric_f0 = functools.lru_cache(_KEPT)(self._f0_of_folder)
         if not self._cases and self._format is not None:
             reader = READERS[self._format]
-            if not reader.takes or not is_left_out(self._merged(reader, ())):  # else the file may tell it
+            if not reader.tells or not is_left_out(self._merged(reader, ())):  # else the file may tell it
                 self._mapping(reader, (), Told())
 
     def prepare(self, path: Path) -> Prepared:
@@ -95,7 +95,7 @@ class ImportSettings:
         if mapping.f0_at_pca is None:
             return Prepared(path, reader, mapping, digest)
         suffix = path.suffix.lower()
-        found = self._isometric_f0(path.resolve().parent, suffix, reader, mapping, mapping.f0_at_pca)
+        found = self._isometric_f0(path.resolve().parent, suffix, reader, matching, told)
         if found is None:
             raise UserError(
                 f"{path}: no {suffix} file in its folder has an isometric force at pCa {mapping.f0_at_pca:g}, so F0 is "
@@ -104,6 +104,19 @@ class ImportSettings:
         f0, note = found
         digest = hashlib.sha256(f"{digest} {f0.value!r} {note}".encode()).hexdigest()
         return Prepared(path, reader, replace(mapping, f0=f0, f0_note=note), digest)
+
+    def _f0_of_folder(
+        self, folder: Path, suffix: str, reader: Reader, matching: tuple[int, ...], told: Told
+    ) -> tuple[Quantity, str] | None:
+        """See `isometric_f0`; every file is read by what it tells itself."""
+        mapping, _ = self._mapping(reader, matching, told)
+        assert mapping.force is not None  # the mapping was checked
+        assert mapping.f0_at_pca is not None  # or nobody would ask
+
+        def mapping_of(file: Path) -> ImportMapping:
+            return self._mapping(reader, matching, reader.told(file, self._merged(reader, matching)))[0]
+
+        return isometric_f0(folder, suffix, reader, mapping_of, (mapping.force.unit.kind, mapping.f0_at_pca))
 
     def _merge(self, reader: Reader, matching: tuple[int, ...]) -> Mapping[str, Any]:
         """Keys that hold for files of a format that some of the cases match."""
@@ -123,15 +136,16 @@ class ImportSettings:
 
 
 def _check_format(made: ImportMapping, tree: Mapping[str, Any], reader: Reader) -> None:
-    """What only tables have, or only some of them."""
+    """What only some formats have."""
     told: dict[str, object] = {"columns.trial": made.trial_column, "columns.time.rate": made.rate_hz}
-    told |= {f"columns.{key}.pattern": column.pattern for key, column in made.columns.items()}
-    unused = [key for key, value in told.items() if value is not None and not reader.takes]
-    unused += [key for key in TABLE_KEYS if key in tree and key not in reader.takes]
+    keys = [*(key for key, value in told.items() if value is not None), *(key for key in TABLE_KEYS if key in tree)]
+    unused = [(key, key) for key in keys if key not in reader.takes]
+    patterns = [f"columns.{key}.pattern" for key, column in made.columns.items() if column.pattern is not None]
+    unused += [(key, PATTERN) for key in patterns if PATTERN not in reader.takes]
     if unused:
-        takers = [other for other in READERS.values() if other.takes]
-        names = ", ".join(each.name for each in takers if unused[0] not in TABLE_KEYS or unused[0] in each.takes)
-        raise UserError(f"{made.where}: {unused[0]} is for tables ({names}), the file is {reader.name}; leave it out")
+        key, needed = unused[0]
+        names = ", ".join(each.name for each in READERS.values() if needed in each.takes)
+        raise UserError(f"{made.where}: {key} is for {names}, the file is {reader.name}; leave it out")
 
 
 def _with_text_keys(tree: object) -> object:
@@ -159,31 +173,37 @@ def _cases(told: object, where: str) -> list[tuple[re.Pattern[str], Mapping[str,
 
 
 def isometric_f0(
-    folder: Path, suffix: str, reader: Reader, mapping: ImportMapping, pca: float
+    folder: Path, suffix: str, reader: Reader, mapping_of: Callable[[Path], ImportMapping], sought: tuple[str, float]
 ) -> tuple[Quantity, str] | None:
     """F0 of the preparation whose files a folder holds, and its origin in words; None where no file tells it.
 
     Args:
-        mapping: of them; its F0 is not used.
-        pca: of the trial looked for. Where several have it, the largest force counts: a fibre runs down.
+        mapping_of: gives the mapping of each; its F0 is not used.
+        sought: kind of the force, and pCa of the trial. Where several have it, the largest force counts: a fibre runs
+            down.
     """
-    assert mapping.force is not None  # the mapping was checked
-    without_f0 = replace(mapping, f0=None, f0_at_pca=None)
+    kind, pca = sought
     found = [
         (force, file.name)
         for file in sorted(folder.iterdir())
         if file.suffix.lower() == suffix and file.is_file()
-        for force in _forces(file, reader, without_f0, pca)
+        for force in _forces(file, reader, mapping_of, sought)
     ]
     force, name = max(found, key=lambda each: each[0], default=(0.0, ""))
     if force <= 0.0:
         return None
-    return Quantity(force, mapping.force.unit.kind), f", the initial isometric force at pCa {pca:g} in {name}"
+    return Quantity(force, kind), f", the initial isometric force at pCa {pca:g} in {name}"
 
 
-def _forces(file: Path, reader: Reader, mapping: ImportMapping, pca: float) -> Iterator[float]:
+def _forces(
+    file: Path, reader: Reader, mapping_of: Callable[[Path], ImportMapping], sought: tuple[str, float]
+) -> Iterator[float]:
     """Initial isometric forces of a file's trials at a pCa, of those that have one and can be read."""
+    kind, pca = sought
     with contextlib.suppress(UserError):  # a broken neighbour is told when its turn comes
+        mapping = replace(mapping_of(file), f0=None, f0_at_pca=None)
+        if mapping.force is None or mapping.force.unit.kind != kind:
+            return
         found = reader.pca(file, mapping)
         if found is not None and abs(found - pca) > _SAME_PCA:
             return

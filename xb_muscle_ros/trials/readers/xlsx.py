@@ -14,7 +14,7 @@ from xb_muscle_ros.trials.readers.encoding import looks_like_text
 from xb_muscle_ros.trials.readers.exports import rate_of
 from xb_muscle_ros.trials.readers.layout import LOOKED_AT, Wanted
 from xb_muscle_ros.trials.readers.making import head_of, locate, make_table
-from xb_muscle_ros.trials.readers.options import Sheets, TableOptions
+from xb_muscle_ros.trials.readers.options import ANY_TABLE, Sheets, TableOptions
 from xb_muscle_ros.trials.readers.rows import CellRows
 from xb_muscle_ros.trials.readers.table import Table
 from xb_muscle_ros.trials.readers.tabular import TableReader
@@ -27,7 +27,7 @@ class XlsxReader(TableReader):
 
     name = "xlsx"
     suffixes = (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods")
-    takes = ("decimal", "header", "sheet", "blanks")
+    takes = (*ANY_TABLE, "decimal", "header", "sheet", "blanks")
 
     def matches(self, path: Path) -> bool:
         """Whether the file is called so; text that some programs call ``.xls`` is none."""
