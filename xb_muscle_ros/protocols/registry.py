@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.protocols.base import Option, Protocol
+from xb_muscle_ros.protocols.force_clamp import ForceClamps
 from xb_muscle_ros.protocols.force_pca import ForcePca
+from xb_muscle_ros.protocols.force_velocity import ConstantVelocities
 from xb_muscle_ros.protocols.ktr import RedevelopmentRates
 from xb_muscle_ros.protocols.ramp_hold import RampAndHold
 from xb_muscle_ros.protocols.sinusoid import Sinusoid
@@ -20,6 +22,8 @@ _ALL: tuple[Protocol, ...] = (
     QuickSteps(),
     ForcePca(),
     RedevelopmentRates(),
+    ForceClamps(),
+    ConstantVelocities(),
     Twitches(),
     Tetani(),
     Sinusoid(),

@@ -1,0 +1,181 @@
+"""Force clamps (isotonic): velocity, force-velocity and power curves of loads below and above the isometric force."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.errors import naming
+from xb_muscle_ros.models.clamping import clamp_run
+from xb_muscle_ros.models.muscle import Muscle
+from xb_muscle_ros.protocols import force_velocity_curve as curve
+from xb_muscle_ros.protocols.base import Cell, Column, Found, Option, Planned, Protocol, Run, Settings, run_of
+from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
+from xb_muscle_ros.scores.clamp import ClampWindow, clamp_window, velocity
+from xb_muscle_ros.scores.estimate import Estimate, Missing, notes_of
+from xb_muscle_ros.scores.readout import isometric_force
+from xb_muscle_ros.simulation.offline import as_simulated, calcium_per_step
+from xb_muscle_ros.trials.protocol import ALLOWED, Allowed
+from xb_muscle_ros.trials.stamps import to_ns
+from xb_muscle_ros.trials.trial import Trial
+
+CLAMP = "clamp"
+
+
+class ForceClamps(Protocol):
+    """One load in each trial."""
+
+    name = "force-clamp"
+    title = "constant loads: velocity of shortening, force-velocity and power curves"
+    options = (
+        pca_option(4.5),
+        Option(
+            "load", (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9), Allowed(0.0, 3.0, "F/F_isometric"),
+            "over the isometric force of the same trial",
+        ),
+        Option("hold", (0.15,), Allowed(0.001, 60.0, "s"), "how long the load is held, s", many=False),
+        Option("begin", (0.05,), ALLOWED["lead_s"], "velocity is read from so long after the load on, s", many=False),
+        Option("window", (0.05,), Allowed(0.001, 60.0, "s"), "for how long it is read, s", many=False),
+        Option("lead", (0.1,), ALLOWED["lead_s"], "isometric time before, s", many=False),
+        rate_option(5000.0),
+    )  # fmt: skip
+    columns: Mapping[str, Column] = {
+        "trial": Column("trial"),
+        "pca": Column("pCa", form="g"),
+        "isometric_f0": Column("isometric force", "F0", ".4f"),
+        "load": Column("load", "isometric force", ".4f"),
+        "held_within_f0": Column("load held within", "F0", ".1e"),
+        "shortening_l0_per_s": Column("velocity of shortening", "L0/s", ".4f"),
+        "power_f0_l0_per_s": Column("power", "F0·L0/s", ".4f"),
+    }
+    numbers = curve.NUMBERS
+    source = "Hill 1938"
+
+    def plan(self, fibre: str, settings: Settings) -> list[Planned]:
+        """One trial for each pCa and load; its length is that of the rest until a model answers."""
+        hold, begin, window, lead, rate = (settings[k][0] for k in ("hold", "begin", "window", "lead", "rate"))
+        planned = []
+        for pca, load in itertools.product(settings["pca"], settings["load"]):
+            told = {"pca": pca, "load": load, "begin_s": begin, "window_s": window}
+            facts = facts_of(self.name, fibre, f"clamp_load{1e3 * load:g}_pca{10.0 * pca:g}", told)
+            made = planned_between(facts, [("isometric", lead, 0.0), (CLAMP, hold, 0.0)], pca, rate)
+            planned.append(Planned(made.trial))
+        return planned
+
+    def answer(self, muscle: Muscle, planned: Planned, settle_s: float | None = None) -> Run:
+        """The length at which the fibre bears the load, solved for in the compiled step."""
+        load = planned.trial.facts.setting("load")
+        assert load is not None  # planned above
+        phase = planned.trial.phases_by_name()[CLAMP]
+        return _under_load(muscle, planned.trial, phase.start_s, None, load, settle_s)
+
+    def repeat(self, muscle: Muscle, trial: Trial, settle_s: float | None = None) -> Run:
+        """The recorded length up to the clamp, then the recorded load, as a share of the recorded isometric force."""
+        found = _window(Run(trial, trial.force_time_s, trial.measured_f0))
+        before = isometric_force(trial, trial.force_time_s, trial.measured_f0)
+        if isinstance(found, Missing) or not before.value:
+            return super().repeat(muscle, trial, settle_s)
+        return _under_load(muscle, trial, found.start_s, found.end_s, found.load_f0 / before.value, settle_s)
+
+    def analyse(self, fibre: str, of: str, runs: Sequence[Run]) -> Found:
+        """Velocity in the window of each trial, and Hill's hyperbola through them."""
+        rows: list[Mapping[str, Cell]] = []
+        told: list[tuple[str, str]] = []
+        for run in runs:
+            row, whys = _row(run)
+            rows.append(row)
+            told += [(run.trial.facts.trial, why) for why in whys]
+        found = Found(fibre, of, tuple(rows), runs=tuple(runs))
+        pcas = np.unique(np.round(found.column("pca")[np.isfinite(found.column("pca"))], 6))
+        notes = notes_of(told)
+        if pcas.size > 1:
+            notes.append(f"Hill's hyperbola is that of pCa {pcas[0]:g}, the most calcium; give one --pca for another")
+        most = np.isclose(found.column("pca"), pcas[0]) if pcas.size else np.full(len(rows), True)
+        isometric = found.column("isometric_f0")[most]
+        level = float(np.nanmedian(isometric)) if np.any(np.isfinite(isometric)) else np.nan
+        load, speed = found.column("load")[most], found.column("shortening_l0_per_s")[most]
+        numbers, curves, more = curve.numbers_of(load, speed, level, True)
+        return replace(found, numbers=numbers, curves=curves, notes=(*notes, *more))
+
+    def draw(self, figure: Any, found: Sequence[Found]) -> None:
+        """Length against time, velocity and power against load."""
+        curve.draw(figure, found, "length")
+
+    def size_mm(self, found: Sequence[Found]) -> tuple[float, float]:
+        """Three axes beside each other."""
+        return 190.0, 70.0
+
+
+def _under_load(
+    muscle: Muscle, trial: Trial, start_s: float, end_s: float | None, load: float, settle_s: float | None
+) -> Run:
+    """A trial whose length follows from a load from one time on; the rest of a record after the load is left out.
+
+    Args:
+        load: over the model's isometric force where the load begins.
+
+    Raises:
+        UserError, StateViolation: see `Muscle.run` and `clamp_run`; names the trial.
+    """
+    last = trial.time_s.size if end_s is None else int(np.searchsorted(trial.time_s, end_s + 5e-10, side="right"))
+    k = max(int(np.searchsorted(trial.time_s, start_s - 5e-10)), 1)
+    calcium, dt_s = calcium_per_step(trial)[:last], np.diff(to_ns(trial.time_s[:last])) / 1e9
+    length = trial.length_change_l0[:last]
+    with naming(f"trial {trial.facts.trial}"):
+        state = muscle.settle(float(length[0]), float(calcium[0]), settle_s)
+        before = muscle.run(state, dt_s[:k], length[: k + 1], calcium[: k + 1])
+        level = load * muscle.outputs(before[-1]).force_f0
+        after = clamp_run(muscle, before[-1], dt_s[k:], np.full(last - k, level), calcium[k:])
+    states = np.concatenate([before[:-1], after])
+    facts = trial.facts
+    if facts.setting("load") is not None:
+        facts = replace(facts, settings=(*facts.settings, ("load_f0", level)))
+    held = trial.calcium_time_s <= trial.time_s[last - 1]
+    given = replace(
+        trial,
+        facts=facts,
+        time_s=trial.time_s[:last],
+        length_m=facts.reference_length_m * (1.0 + states[:, -3]),
+        calcium_time_s=trial.calcium_time_s[held],
+        calcium_um=trial.calcium_um[held],
+        force_time_s=np.empty(0),
+        force_n=np.empty(0),
+    )
+    return run_of(given, as_simulated(given, given.time_s, muscle.outputs_of(states)))
+
+
+def _window(run: Run) -> ClampWindow | Missing:
+    """The clamp that the trial tells of, or that its force shows."""
+    phase = run.trial.phases_by_name().get(CLAMP)
+    known = None if phase is None else (phase.start_s, phase.end_s)
+    return clamp_window(run.time_s, run.force_f0, run.length_l0, known)
+
+
+def _row(run: Run) -> tuple[Mapping[str, Cell], list[str]]:
+    """A row, and what there is to say of it."""
+    facts = run.trial.facts
+    before = isometric_force(run.trial, run.time_s, run.force_f0, run.noise)
+    row: dict[str, Cell] = {"trial": facts.trial, "pca": facts.pca, "isometric_f0": before}
+    found = _window(run)
+    if before.value is None or isinstance(found, Missing):
+        return row, [f"clamp: {found.why if isinstance(found, Missing) else before.why}"]
+    told = [f"clamp: found from force, {found.start_s:.4g} to {found.end_s:.4g} s"] if found.guessed else []
+    begin_s, window_s = run.setting("begin_s"), run.setting("window_s")
+    if begin_s is None or window_s is None:
+        # The middle third: the springs have given way, and the load is not yet over.
+        third = (found.end_s - found.start_s) / 3.0
+        begin_s, window_s = third, third
+        told.append("velocity: read in the middle third of the clamp")
+    begin_s += found.start_s
+    speed = velocity(run.time_s, run.length_l0, begin_s, min(begin_s + window_s, found.end_s))
+    row |= {"load": found.load_f0 / before.value, "held_within_f0": found.held_within_f0}
+    if isinstance(speed, Missing):
+        return row, [*told, f"velocity: {speed.why}"]
+    noisy = run.simulated is None
+    shortening = Estimate(-speed.value, speed.se if noisy else None)
+    power = Estimate(-speed.value * found.load_f0, None if not noisy else abs(found.load_f0) * speed.se)
+    return row | {"shortening_l0_per_s": shortening, "power_f0_l0_per_s": power}, told

@@ -1,0 +1,130 @@
+"""Ramps of constant velocity: force against velocity on both sides of isometric."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.protocols import force_velocity_curve as curve
+from xb_muscle_ros.protocols.base import Cell, Column, Found, Option, Planned, Protocol, Run, Settings
+from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
+from xb_muscle_ros.scores.estimate import Estimate, notes_of, quotient
+from xb_muscle_ros.scores.readout import isometric_force
+from xb_muscle_ros.trials.protocol import ALLOWED, Allowed
+from xb_muscle_ros.trials.trial import Phase
+
+# Force is read where length passes the middle of the ramp: a mean over this share of its duration.
+_SHARE = 0.05
+_MOVING = ("stretch", "shortening", "release", "test_stretch")
+
+
+class ConstantVelocities(Protocol):
+    """One velocity in each trial."""
+
+    name = "force-velocity"
+    title = "ramps of constant velocity: force against velocity, on both sides of isometric"
+    options = (
+        pca_option(4.5),
+        Option(
+            "velocity", (-1.0, -0.7, -0.5, -0.35, -0.25, -0.15, -0.1, -0.05, 0.05, 0.1, 0.25, 0.5),
+            Allowed(-50.0, 50.0, "L0/s"), "of length, L0/s; negative shortens",
+        ),
+        Option("amplitude", (0.2,), Allowed(0.0, 0.5, "L0", True), "of the ramp around rest length, L0", many=False),
+        Option("lead", (0.1,), ALLOWED["lead_s"], "isometric time before, s", many=False),
+        rate_option(5000.0),
+    )  # fmt: skip
+    columns: Mapping[str, Column] = {
+        "trial": Column("trial"),
+        "pca": Column("pCa", form="g"),
+        "isometric_f0": Column("isometric force", "F0", ".4f"),
+        "shortening_l0_per_s": Column("velocity of shortening", "L0/s", ".4g"),
+        "force_f0": Column("force at mid-ramp", "F0", ".4f"),
+        "load": Column("over isometric force", "", ".4f"),
+        "power_f0_l0_per_s": Column("power", "F0·L0/s", ".4f"),
+    }
+    numbers = curve.NUMBERS
+    source = "e.g. Edman 1988"
+
+    def plan(self, fibre: str, settings: Settings) -> list[Planned]:
+        """One trial for each pCa and velocity, from one side of rest length to the other."""
+        amplitude, lead, rate = (settings[k][0] for k in ("amplitude", "lead", "rate"))
+        planned = []
+        for pca, speed in itertools.product(settings["pca"], settings["velocity"]):
+            if speed == 0.0:
+                continue  # the isometric force is that before each ramp
+            rise = amplitude if speed > 0.0 else -amplitude
+            name = f"velocity_{'plus' if speed > 0.0 else 'minus'}{abs(speed):g}_pca{10.0 * pca:g}"
+            told = {"pca": pca, "velocity_l0_per_s": speed, "amplitude_l0": amplitude}
+            moved = "stretch" if speed > 0.0 else "shortening"
+            steps = [("isometric", lead, 0.0), (moved, amplitude / abs(speed), rise)]
+            made = planned_between(facts_of(self.name, fibre, name, told), steps, pca, rate)
+            start = -0.5 * rise
+            trial = replace(made.trial, length_m=made.trial.length_m + start)
+            planned.append(Planned(trial, made.corner_s, made.corner_l0 + start))
+        return planned
+
+    def analyse(self, fibre: str, of: str, runs: Sequence[Run]) -> Found:
+        """Force where length passes the middle of each ramp, and Hill's hyperbola through those of shortening."""
+        rows: list[Mapping[str, Cell]] = []
+        told: list[tuple[str, str]] = []
+        for run in runs:
+            row, why = _row(run)
+            rows.append(row)
+            told += [(run.trial.facts.trial, why)] if why else []
+        found = Found(fibre, of, tuple(rows), runs=tuple(runs))
+        pca = found.column("pca")
+        pcas = np.unique(np.round(pca[np.isfinite(pca)], 6))
+        notes = notes_of(told)
+        if pcas.size > 1:
+            notes.append(f"Hill's hyperbola is that of pCa {pcas[0]:g}, the most calcium; give one --pca for another")
+        most = np.isclose(pca, pcas[0]) if pcas.size else np.full(len(rows), True)
+        isometric = found.column("isometric_f0")[most]
+        level = float(np.nanmedian(isometric)) if np.any(np.isfinite(isometric)) else np.nan
+        load, speed = found.column("load")[most], found.column("shortening_l0_per_s")[most]
+        numbers, curves, more = curve.numbers_of(load, speed, level, False)
+        return replace(found, numbers=numbers, curves=curves, notes=(*notes, *more))
+
+    def draw(self, figure: Any, found: Sequence[Found]) -> None:
+        """Force against time, velocity and power against force."""
+        curve.draw(figure, found, "force")
+
+    def size_mm(self, found: Sequence[Found]) -> tuple[float, float]:
+        """Three axes beside each other."""
+        return 190.0, 70.0
+
+
+def _ramp(run: Run) -> Phase | None:
+    moving = [phase for phase in run.trial.facts.phases if phase.name in _MOVING]
+    others = [phase for phase in run.trial.facts.phases if phase.name == "conditioning_stretch"]
+    return moving[0] if len(moving) == 1 and not others else None
+
+
+def _row(run: Run) -> tuple[Mapping[str, Cell], str]:
+    """A row, and why it lacks what it lacks."""
+    facts = run.trial.facts
+    before = isometric_force(run.trial, run.time_s, run.force_f0, run.noise)
+    row: dict[str, Cell] = {"trial": facts.trial, "pca": facts.pca, "isometric_f0": before}
+    phase = _ramp(run)
+    if phase is None:
+        return row, "ramp: there is no single stretch or shortening"
+    lasts_s = phase.end_s - phase.start_s
+    speed = run.setting("velocity_l0_per_s")
+    if speed is None:
+        # The corners are cut off by samples and filters: the middle half of the ramp tells its speed.
+        ends = phase.start_s + lasts_s * np.array([0.25, 0.75])
+        low, high = np.interp(ends, run.trial.time_s, run.trial.length_change_l0)
+        speed = float(high - low) / (0.5 * lasts_s)
+    middle, half = 0.5 * (phase.start_s + phase.end_s), 0.5 * _SHARE * lasts_s
+    inside = (run.time_s >= middle - half - 5e-10) & (run.time_s <= middle + half + 5e-10)
+    if not np.any(inside):
+        inside = np.arange(run.time_s.size) == int(np.argmin(np.abs(run.time_s - middle)))
+    se = None if run.noise is None else run.noise.of_mean(run.time_s[inside])
+    force = Estimate(float(np.mean(run.force_f0[inside])), se)
+    assert force.value is not None
+    power = Estimate(-speed * force.value, None if se is None else abs(speed) * se)
+    row |= {"shortening_l0_per_s": -speed, "force_f0": force, "power_f0_l0_per_s": power}
+    return row | {"load": quotient(force, before)}, f"isometric force: {before.why}" if before.value is None else ""

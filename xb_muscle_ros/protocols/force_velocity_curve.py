@@ -1,0 +1,89 @@
+"""What force clamps and ramps of constant velocity have in common: Hill's hyperbola, its numbers and its figure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from xb_muscle_ros.protocols.base import Column, Curve, Found, Number
+from xb_muscle_ros.protocols.figures import legend, lettered, looks
+from xb_muscle_ros.scores.estimate import Missing
+from xb_muscle_ros.scores.force_velocity import HillCurve, fit_hill, hill_velocity
+from xb_muscle_ros.trials.trial import Array
+
+NUMBERS: Mapping[str, Column] = {
+    "vmax_l0_per_s": Column("vmax", "L0/s", ".3f"),
+    "a_over_f0": Column("a/F0", "", ".3f"),
+    "b_l0_per_s": Column("b", "L0/s", ".3f"),
+    "power_f0_l0_per_s": Column("largest power", "F0·L0/s", ".4f"),
+    "load_at_power": Column("at a load of", "isometric force", ".3f"),
+    "rmsd": Column("RMSD of the points", "", ".3g"),
+}
+
+
+def numbers_of(
+    load: Array, velocity_l0_per_s: Array, isometric_f0: float, load_is_given: bool
+) -> tuple[dict[str, Number], dict[str, Curve], list[str]]:
+    """Numbers of `NUMBERS`, the curve (load, velocity), and notes.
+
+    Args:
+        load: force over the isometric force, shape (n,).
+        velocity_l0_per_s: of shortening, shape (n,), L0/s.
+        isometric_f0: force, F0.
+        load_is_given: see `fit_hill`.
+    """
+    found = fit_hill(load, velocity_l0_per_s, load_is_given)
+    if isinstance(found, Missing):
+        return {key: Number(None, why=found.why) for key in NUMBERS}, {}, [f"Hill's hyperbola: {found.why}"]
+    x = np.linspace(0.0, 1.0, 200)
+    numbers = {
+        "vmax_l0_per_s": _number(found.vmax_l0_per_s, found.se[2], found),
+        "a_over_f0": _number(found.a, found.se[0], found),
+        "b_l0_per_s": _number(found.b_l0_per_s, found.se[1], found),
+        "power_f0_l0_per_s": Number(found.power_l0_per_s * isometric_f0),
+        "load_at_power": Number(found.load_at_power),
+        "rmsd": Number(found.rmsd),
+    }
+    return numbers, {"hill": Curve(x, hill_velocity(x, found.a, found.vmax_l0_per_s))}, []
+
+
+def draw(figure: Any, found: Sequence[Found], traces: str) -> None:
+    """Records against time, velocity against load, and power against load.
+
+    Args:
+        found: with columns ``load``, ``shortening_l0_per_s`` and ``power_f0_l0_per_s``.
+        traces: what is drawn against time, ``length`` or ``force``.
+    """
+    record, velocity, power = figure.subplots(1, 3)
+    for look, each in looks(found):
+        for run in each.runs:
+            start_s = next((p.start_s for p in run.trial.facts.phases if p.name != "isometric"), 0.0)
+            shown = 100.0 * run.length_l0 if traces == "length" else run.force_f0
+            record.plot(run.time_s - start_s, shown, **look.trace)
+        load = each.column("load")
+        velocity.plot(load, each.column("shortening_l0_per_s"), **look.points)
+        power.plot(load, each.column("power_f0_l0_per_s"), **look.points)
+        if "hill" in each.curves:
+            curve = each.curves["hill"]
+            velocity.plot(curve.x, curve.y, **look.curve)
+            isometric = float(np.nanmedian(each.column("isometric_f0")))
+            power.plot(curve.x, curve.x * curve.y * isometric, **look.curve)
+    record.set(
+        xlabel=f"time from the begin of the {'clamp' if traces == 'length' else 'ramp'} (s)",
+        ylabel="length change (% L$_0$)" if traces == "length" else "force (F$_0$)",
+    )
+    velocity.set(xlabel="force over isometric force", ylabel="velocity of shortening (L$_0$/s)")
+    power.set(xlabel="force over isometric force", ylabel="power (F$_0$·L$_0$/s)")
+    for axis in (velocity, power):
+        axis.axhline(0.0, color="black", linewidth=0.6)
+        axis.set_xlim(left=0.0)
+    legend(velocity)
+    lettered([record, velocity, power])
+
+
+def _number(value: float, se: float | None, found: HillCurve) -> Number:
+    if se is None:
+        return Number(value, why="too few points for a standard error")
+    return Number(value, se, value - found.interval * se, value + found.interval * se)
