@@ -69,9 +69,10 @@ def test_round_trip(
     if why:
         assert "\n" not in why
         assert str(path) in why
-        # Commas of both kinds; nothing between blanks; classic ends of lines, which are not those of cp1252.
-        both = decimal == COMMA and (delimiter == "," or not told)
-        assert both or (delimiter == "   " and "" in blanks.values()) or (end == "\r" and encoding == "cp1252"), why
+        # Decimal commas between commas, or each one that of a thousand; nothing between blanks; classic ends of lines,
+        # which are not those of cp1252.
+        commas = decimal == COMMA and (delimiter == "," or (not told and "tell which by --decimal comma" in why))
+        assert commas or (delimiter == "   " and "" in blanks.values()) or (end == "\r" and encoding == "cp1252"), why
         return
     for column, (values, blank) in enumerate(found):
         places = [row for row, at in blanks if at == column]
