@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from xb_muscle_ros.errors import StateViolation, UserError, naming
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.simulation.offline import pushing, simulate_trial
+from xb_muscle_ros.trials.readers.csv import read_csv
+from xb_muscle_ros.trials.readers.mapping import build_mapping
 from xb_muscle_ros.trials.trial import Trial, TrialFacts
 
 
@@ -39,6 +42,17 @@ def test_a_model_that_pushes_is_told_once_with_trial_force_and_time(muscle: Musc
     there = simulate_trial(slack, trial)
     assert there.force_n.min() >= 0.0
     assert pushing(trial, there, "3state_coop_slack") is None
+
+
+def test_the_handed_shortening_pushes_as_documented_and_goes_slack_where_asked(
+    muscle: Muscle, shared_cases: Path
+) -> None:
+    columns = {"time": {"column": "time_s", "unit": "s"}, "length": {"column": "length_l0", "unit": "L0"}}
+    mapping = build_mapping({"fibre": "18Dec2017a", "pca": 4.5, "columns": columns}, "here")
+    trial = read_csv(shared_cases / "numeric" / "vmax.csv", mapping)
+    assert simulate_trial(muscle, trial).force_n.min() / muscle.fibre.f0_n == pytest.approx(-0.54, abs=0.01)
+    slack = Muscle(load_fibre("18Dec2017a", "3state_coop_slack"))
+    assert simulate_trial(slack, trial).force_n.min() >= 0.0
 
 
 def test_a_failing_simulation_names_its_trial(muscle: Muscle) -> None:

@@ -66,12 +66,19 @@ def read_table(path: Path, options: TableOptions | None = None) -> Table:
 
 def _lines(text: str) -> _Lines:
     """Lines that may be part of a table."""
-    kept = [(i, line) for i, line in enumerate(text.splitlines(), 1) if line.strip()]
-    comments = [(i, line) for i, line in kept if line.startswith("#") and not _MISSING.match(line)]
-    if comments:
-        out = {i for i, _ in comments}
-        kept = [each for each in kept if each[0] not in out]
-    return _Lines([line for _, line in kept], [i for i, _ in kept], comments)
+    texts = text.splitlines()
+    comments, out = [], set()
+    for i, line in enumerate(texts):
+        if line.startswith("#") and not _MISSING.match(line):
+            comments.append((i + 1, line))
+            out.add(i)
+        elif not line or line.isspace():
+            out.add(i)
+    numbers = list(range(1, len(texts) + 1))
+    if out:
+        texts = [line for i, line in enumerate(texts) if i not in out]
+        numbers = [number for number in numbers if number - 1 not in out]
+    return _Lines(texts, numbers, comments)
 
 
 def _table(path: Path, lines: _Lines, separator: str | None, options: TableOptions, encoding: str) -> Table:

@@ -22,7 +22,7 @@ LABCHART_TIME = "Time"
 # A line above a table that tells its rate: the words for it, then a number and its unit, in either order.
 _RATE = re.compile(
     r"(?:sampl\w*|scan|acquisition|data)[ _-]*(?P<what>rate|freq\w*|interval|period)\b\W*?"
-    r"(?:[(\[]\s*(?P<unit>\S+?)\s*[)\]]\W*?)?(?P<value>\d[\d.,]*(?:[eE][+-]?\d+)?)\W*?(?P<after>\w+)?",
+    r"(?:[(\[]\s*(?P<unit>\S+?)\s*[)\]]\W*?)?(?P<value>\d[\d.,]*(?:[eE][+-]?\d+)?)(?:\W*(?P<after>[^\W\d]\w*))?",
     re.IGNORECASE,
 )
 

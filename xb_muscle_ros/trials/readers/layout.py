@@ -50,7 +50,7 @@ class Wanted:
         """Whether a row names all of them."""
         if not self.names and not self.patterns:
             return False
-        return self.names <= set(row) and all(any(map(pattern.search, row)) for pattern in self.patterns)
+        return self.names <= set(row) and all(any(map(pattern.fullmatch, row)) for pattern in self.patterns)
 
 
 class Found(NamedTuple):

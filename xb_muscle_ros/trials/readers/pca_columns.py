@@ -29,10 +29,10 @@ def check_pca(table: Table, mapping: ImportMapping, part: Part, pca: float | Non
     patterns = [column.pattern for column in mapping.columns.values() if column.pattern is not None]
     others = []
     for name in table.header:
-        if PCA_COLUMN.match(name):
-            _check_column(table, name, part, pca)
         found = _PCA_IN_NAME.search(name)
         if found is None:
+            if PCA_COLUMN.match(name):
+                _check_column(table, name, part, pca)
             continue
         stated = float(found.group(1).replace(",", "."))
         stated = stated / 10.0 if stated > 12.0 else stated  # 61 is 6.1

@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.trials.readers.assembly import trial_of
 from xb_muscle_ros.trials.readers.base import Reader
-from xb_muscle_ros.trials.readers.description import ImportMapping, name_of
+from xb_muscle_ros.trials.readers.description import FACTS, ImportMapping, name_of
 from xb_muscle_ros.trials.readers.force import Force, isometric_force
 from xb_muscle_ros.trials.readers.left_out import Told, is_left_out
 from xb_muscle_ros.trials.readers.mapping import build_mapping
-from xb_muscle_ros.trials.readers.options import PATTERN, TABLE_KEYS
+from xb_muscle_ros.trials.readers.options import PATTERN, TABLE_KEYS, read_options
 from xb_muscle_ros.trials.readers.registry import READERS, reader_for
 from xb_muscle_ros.trials.readers.tree import Keys, merged
 from xb_muscle_ros.trials.readers.units import Quantity
@@ -121,7 +121,12 @@ class ImportSettings:
     def _merge(self, reader: Reader, matching: tuple[int, ...]) -> Mapping[str, Any]:
         """Keys that hold for files of a format that some of the cases match."""
         trees = (self._tree, *(self._cases[i][1] for i in matching), self._overrides)
-        return functools.reduce(merged, trees, dict(reader.defaults))
+        tree = functools.reduce(merged, trees, dict(reader.defaults))
+        try:
+            read_options(Keys(tree, self._where), FACTS)  # a table is looked into before the rest is checked
+        except UserError as problem:
+            raise MappingError(str(problem)) from None
+        return tree
 
     def _built(self, reader: Reader, matching: tuple[int, ...], found: Told) -> tuple[ImportMapping, str]:
         """The mapping of such files, with what they tell themselves, and its digest."""

@@ -141,7 +141,7 @@ class Table:
         """
         if self.has_clock(column):
             return self._clock(column, rows), True
-        values, blank = self.samples(column)
+        values, blank = self.samples(column, ragged=True)  # missing times are refused here
         missing = np.zeros_like(blank)
         missing[rows] = blank[rows]
         if missing.any():

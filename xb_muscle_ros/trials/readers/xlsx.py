@@ -19,8 +19,6 @@ from xb_muscle_ros.trials.readers.rows import CellRows
 from xb_muscle_ros.trials.readers.table import Table
 from xb_muscle_ros.trials.readers.tabular import TableReader
 
-_MIDNIGHT = datetime.time()
-
 
 class XlsxReader(TableReader):
     """Sheets of a workbook. Formulas have the values that the program which saved the file gave them."""
@@ -98,7 +96,8 @@ def _table(path: Path, name: str, workbook: Any, options: TableOptions) -> Table
     sheet = workbook.get_sheet_by_name(name)
     everything = sheet.to_python(skip_empty_area=False)
     numbers = [i for i, row in enumerate(everything, 1) if any(cell != "" for cell in row)]
-    rows = [_ended([_cell(cell) for cell in everything[i - 1]]) for i in numbers]
+    moments = {j for row in everything for j, cell in enumerate(row) if isinstance(cell, datetime.datetime)}
+    rows = [_ended([_cell(cell, j in moments) for j, cell in enumerate(everything[i - 1])]) for i in numbers]
     where = f"{path}, sheet '{name}'"
     if not rows:
         raise UserError(f"{where} is empty; needed are a header and rows of numbers")
@@ -128,8 +127,12 @@ def _ended(row: list[Cell]) -> list[Cell]:
     return row
 
 
-def _cell(value: Any) -> Cell:
-    """A number or text; times and dates are written as clocks show them."""
+def _cell(value: Any, moment: bool) -> Cell:
+    """A number or text; times and dates are written as clocks show them.
+
+    Args:
+        moment: the column holds dates with times: one without is midnight.
+    """
     if isinstance(value, bool):
         return float(value)
     if isinstance(value, (int, float)):
@@ -140,7 +143,7 @@ def _cell(value: Any) -> Cell:
         seconds = value.total_seconds()
         return f"{int(seconds // 3600)}:{int(seconds % 3600 // 60):02}:{seconds % 60:09.6f}"
     if isinstance(value, datetime.date):
-        return value.isoformat()
+        return f"{value.isoformat()} 00:00:00" if moment else value.isoformat()
     if isinstance(value, datetime.time):
         return value.isoformat("microseconds")
     return str(value)

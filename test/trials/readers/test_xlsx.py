@@ -1,0 +1,129 @@
+"""Workbooks: sheets are trials, cells numbers, text, dates or times; the rest is as for text."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import lab_tables as lab
+import numpy as np
+import pytest
+
+openpyxl = pytest.importorskip("openpyxl", reason="needs openpyxl")
+pytest.importorskip("python_calamine", reason="needs the extra files")
+
+ROWS = [list(row) for row in zip(lab.TIME_S.tolist(), lab.LENGTH_MM.tolist(), lab.FORCE_MN.tolist(), strict=True)]
+DOUBLE = [[t, length, 2 * f] for t, length, f in ROWS]
+
+
+def book(folder: Path, merged: str = "", name: str = "t.xlsx", **sheets: Sequence[Sequence[Any]]) -> Path:
+    made = openpyxl.Workbook()
+    made.remove(made.active)
+    for title, rows in sheets.items():
+        sheet = made.create_sheet(title.replace("_", " "))
+        for row in rows:
+            sheet.append(list(row))
+        if merged:
+            sheet.merge_cells(merged)
+    folder.mkdir(exist_ok=True)
+    made.save(folder / name)
+    return folder / name
+
+
+def test_a_sheet_is_a_trial_and_bits_are_kept(tmp_path: Path) -> None:
+    path = book(tmp_path, Sheet1=[lab.NAMES, *ROWS])
+    (trial,) = lab.trials(path)
+    lab.same(trial)
+    assert (trial.facts.trial, trial.warnings) == ("t", ())
+    assert (trial.force_n / 1e-3).tolist() == (1e-3 * lab.FORCE_MN / 1e-3).tolist()
+
+
+def test_sheets_are_trials_and_those_without_the_columns_are_left_out_and_told(tmp_path: Path) -> None:
+    path = book(
+        tmp_path, notes=[["rig 3"], ["on", "Monday"]], run_1=[lab.NAMES, *ROWS], run_2=[lab.NAMES, *DOUBLE], empty=[]
+    )
+    one, two = lab.trials(path)
+    lab.same(one)
+    lab.same(two, force_mn=2 * lab.FORCE_MN)
+    assert (one.facts.trial, two.facts.trial) == ("t_run 1", "t_run 2")
+    assert f"left out: {path}, sheet 'notes'" in lab.told(one)
+    assert f"left out: {path}, sheet 'empty' is empty" in lab.told(one)
+
+
+def test_a_sheet_by_name_and_by_pattern_with_facts(tmp_path: Path) -> None:
+    sheets = {"pCa4.5": [lab.NAMES, *ROWS], "pCa6.1": [lab.NAMES, *DOUBLE], "notes": [["x"]]}
+    path = book(tmp_path, **sheets)
+    (trial,) = lab.trials(path, sheet="pCa6.1")
+    lab.same(trial, force_mn=2 * lab.FORCE_MN)
+    assert trial.facts.trial == "t"
+    found = lab.trials(book(tmp_path / "b", **sheets), pca=None, sheet={"pattern": "pCa(?P<pca>.+)"})
+    assert [(each.facts.trial, each.facts.pca) for each in found] == [("t_pCa4.5", 4.5), ("t_pCa6.1", 6.1)]
+    assert "has no sheet 'pCa6.2'; its sheets: pCa4.5, pCa6.1, notes; did you mean 'pCa6.1'" in lab.refusal(
+        book(tmp_path / "c", **sheets), sheet="pCa6.2"
+    )
+
+
+def test_text_numbers_units_and_preamble(tmp_path: Path) -> None:
+    text = [[repr(t).replace(".", ","), length, str(f)] for t, length, f in ROWS]
+    path = book(tmp_path, s=[["Rig"], [], ["Sampling rate", 1000, "Hz"], ["t", "L", "F"], ["s", "mm", "mN"], *ROWS])
+    (trial,) = lab.trials(path, {key: {"column": name} for key, name in zip(lab.COLUMNS, "tLF", strict=True)})
+    lab.same(trial)
+    assert "row 4 names the columns" in lab.told(trial)
+    assert "row 5 holds units: s, mm, mN" in lab.told(trial)
+    columns = {key: spec for key, spec in zip(lab.COLUMNS, ({}, {"column": "L"}, {"column": "F"}), strict=True) if spec}
+    (trial,) = lab.trials(path, columns, trial="by_rate")
+    lab.same(trial)
+    assert "there are 1000 samples in a second by 'Sampling rate 1000.0 Hz'" in lab.told(trial)
+    why = lab.refusal(book(tmp_path / "b", s=[lab.NAMES, *text]))
+    assert "decimal commas and points in one file" in why
+    dotless = [[a, length, f] for (a, _, _), (_, length, f) in zip(text, ROWS, strict=True)]
+    (trial,) = lab.trials(book(tmp_path / "c", s=[lab.NAMES, *dotless]))
+    lab.same(trial)
+    assert "has decimal commas: '0,0' in row 2" in lab.told(trial)
+
+
+@pytest.mark.parametrize("kind", ["time", "datetime", "timedelta"])
+def test_times_of_a_clock(tmp_path: Path, kind: str) -> None:
+    start = datetime.datetime(2018, 12, 17, 0, 0, 0)
+    steps = [datetime.timedelta(milliseconds=i) for i in range(lab.N)]
+    cells = {"time": [(start + s).time() for s in steps], "datetime": [start + s for s in steps], "timedelta": steps}[
+        kind
+    ]
+    path = book(tmp_path, s=[lab.NAMES, *([c, *row[1:]] for c, row in zip(cells, ROWS, strict=True))])
+    (trial,) = lab.trials(path, {**lab.COLUMNS, "time": {"column": "time_s"}})
+    lab.same(trial)
+    assert "holds times of a clock" in lab.told(trial)
+
+
+def test_a_merged_header_names_the_columns_below_it(tmp_path: Path) -> None:
+    rows = [[*a, *b[1:]] for a, b in zip(ROWS, DOUBLE, strict=True)]
+    head = [["time_s", "pCa 4.5", None, "pCa 6.1", None], [None, "L", "F", "L", "F"]]
+    path = book(tmp_path, merged="B1:C1", s=[*head, *rows])
+    columns = {"time": {"column": "time_s", "unit": "s"}, "length": {"pattern": "pCa (?P<pca>.+) L", "unit": "mm"},
+               "force": {"pattern": "pCa (?P<pca>.+) F", "unit": "mN"}}  # fmt: skip
+    one, two = lab.trials(path, columns, pca=None)
+    lab.same(one)
+    lab.same(two, force_mn=2 * lab.FORCE_MN)
+    assert (one.facts.pca, two.facts.pca) == (4.5, 6.1)
+
+
+def test_blanks_and_faults_name_the_row(tmp_path: Path) -> None:
+    rows = [[*row] for row in ROWS]
+    rows[7][2] = None
+    rows[20][2] = "#N/A"
+    (trial,) = lab.trials(book(tmp_path, s=[lab.NAMES, *rows]))
+    assert "2 blank samples in 2 runs were filled by straight lines, at 0.007 s, 0.02 s" in lab.told(trial)
+    rows[9][1] = "over"
+    assert "sheet 's', row 11, column 'length_mm' holds 'over'" in lab.refusal(
+        book(tmp_path / "b", s=[lab.NAMES, *rows])
+    )
+
+
+def test_what_is_no_workbook_is_refused_or_read_as_what_it_is(tmp_path: Path) -> None:
+    assert "is no whole workbook" in lab.refusal(lab.write(tmp_path / "a", b"PK\x03\x04\x00\x00", "t.xlsx"))
+    path = lab.write(tmp_path / "b", ["\t".join(lab.NAMES), *lab.rows(delimiter="\t")], "t.xls")
+    lab.same(lab.trials(path)[0])
+    assert np.isclose(lab.trials(path, trial="again")[0].facts.pca, 6.1)
+    assert "no sheet holds the table" in lab.refusal(book(tmp_path / "c", a=[["x"], ["y"]], b=[["z"]]))
