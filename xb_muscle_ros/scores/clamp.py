@@ -95,7 +95,7 @@ def _longest_level(time_s: Array, force_f0: Array, length_l0: Array) -> tuple[fl
     rest = np.arange(int(away[0]), force_f0.size)
     # Levels that come often: a clamp is where a histogram of force is high.
     counts, edges = np.histogram(force_f0[rest], bins=max(int(np.ptp(force_f0[rest]) / (0.5 * _CLAMPED_F0)), 1))
-    for k in np.argsort(counts)[::-1][:5]:
+    for k in np.argsort(counts)[::-1][: min(5, int(np.count_nonzero(counts)))]:
         level = float(np.median(force_f0[rest][(force_f0[rest] >= edges[k]) & (force_f0[rest] <= edges[k + 1])]))
         if abs(level - force_f0[0]) <= _CLAMPED_F0:
             continue
