@@ -154,7 +154,9 @@ class Reader(abc.ABC):
         begins: what such files begin with, where that tells them.
         kind: how a mapping names signals, `columns.FILE` or `columns.BAG`.
         defaults: what a mapping need not say for this format; a tree as a mapping file has it.
-        takes: keys of `options.TABLE_KEYS` that it knows; those with any read tables.
+        is_table: whether it reads tables, which may have several trials, no column of time, or units in their header.
+        in_header: of ``f0`` and ``reference_length``, what files of the format may tell themselves; see `completed`.
+        takes: keys of `options.TABLE_KEYS` and other keys for some formats alone that it knows.
     """
 
     name: str
@@ -162,11 +164,25 @@ class Reader(abc.ABC):
     begins: tuple[bytes, ...] = ()
     kind: str = FILE
     defaults: Mapping[str, Any] = {}
+    is_table: bool = False
+    in_header: tuple[str, ...] = ()
     takes: tuple[str, ...] = ()
 
     def matches(self, path: Path) -> bool:
         """Whether a file or folder is of this format, as far as its begin and its name tell."""
         return path.suffix.lower() in self.suffixes or begin_of(path).startswith(self.begins)
+
+    def defaults_for(self, own: Mapping[str, Any]) -> Mapping[str, Any]:
+        """What a mapping with these keys of its own need not say."""
+        return self.defaults
+
+    def completed(self, path: Path, mapping: ImportMapping) -> ImportMapping:
+        """The mapping of one file, with what its header tells where the mapping tells nothing.
+
+        Raises:
+            UserError: the file cannot be read, or a fact is neither in the header nor in the mapping.
+        """
+        return mapping
 
     @abc.abstractmethod
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:

@@ -21,7 +21,7 @@ from xb_muscle_ros.trials.readers.left_out import Told, is_left_out
 from xb_muscle_ros.trials.readers.mapping import build_mapping
 from xb_muscle_ros.trials.readers.options import TABLE_KEYS
 from xb_muscle_ros.trials.readers.registry import READERS, reader_for
-from xb_muscle_ros.trials.readers.tree import Keys, merged
+from xb_muscle_ros.trials.readers.tree import Keys, dotted_keys, merged
 from xb_muscle_ros.trials.readers.units import Quantity
 
 # Raised when the same file and mapping would make another trial than before.
@@ -78,7 +78,7 @@ class ImportSettings:
         self._isometric_f0 = functools.lru_cache(_KEPT)(isometric_f0)
         if not self._cases and self._format is not None:
             reader = READERS[self._format]
-            if not reader.takes or not is_left_out(self._merged(reader, ())):  # else the file may tell it
+            if not reader.is_table or not is_left_out(self._merged(reader, ())):  # else the file may tell it
                 self._mapping(reader, (), Told())
 
     def prepare(self, path: Path) -> Prepared:
@@ -91,11 +91,12 @@ class ImportSettings:
         reader = reader_for(path, self._format)
         matching = tuple(i for i, (files, _) in enumerate(self._cases) if files.search(name_of(path)))
         told = reader.told(path, self._merged(reader, matching))
-        mapping, digest = self._mapping(reader, matching, told)
+        general, digest = self._mapping(reader, matching, told)
+        mapping = reader.completed(path, general)
         if mapping.f0_at_pca is None:
             return Prepared(path, reader, mapping, digest)
         suffix = path.suffix.lower()
-        found = self._isometric_f0(path.resolve().parent, suffix, reader, mapping, mapping.f0_at_pca)
+        found = self._isometric_f0(path.resolve().parent, suffix, reader, general, mapping.f0_at_pca)
         if found is None:
             raise UserError(
                 f"{path}: no {suffix} file in its folder has an isometric force at pCa {mapping.f0_at_pca:g}, so F0 is "
@@ -105,33 +106,44 @@ class ImportSettings:
         digest = hashlib.sha256(f"{digest} {f0.value!r} {note}".encode()).hexdigest()
         return Prepared(path, reader, replace(mapping, f0=f0, f0_note=note), digest)
 
+    def _own(self, matching: tuple[int, ...]) -> Mapping[str, Any]:
+        """Keys that the mapping and the options tell for files that some of the cases match."""
+        trees = (self._tree, *(self._cases[i][1] for i in matching), self._overrides)
+        own: Mapping[str, Any] = functools.reduce(merged, trees, {})
+        return own
+
     def _merge(self, reader: Reader, matching: tuple[int, ...]) -> Mapping[str, Any]:
         """Keys that hold for files of a format that some of the cases match."""
         trees = (self._tree, *(self._cases[i][1] for i in matching), self._overrides)
-        return functools.reduce(merged, trees, dict(reader.defaults))
+        return functools.reduce(merged, trees, dict(reader.defaults_for(self._own(matching))))
 
     def _built(self, reader: Reader, matching: tuple[int, ...], found: Told) -> tuple[ImportMapping, str]:
         """The mapping of such files, with what they tell themselves, and its digest."""
         tree = merged(found.tree, self._merged(reader, matching))
         told = json.dumps([VERSION, reader.name, self.isometric_scaling, _with_text_keys(tree)], sort_keys=True)
         try:
-            made = build_mapping(tree, self._where, reader.kind)
+            made = build_mapping(tree, self._where, reader.kind, reader.in_header)
             _check_format(made, tree, reader)
         except UserError as problem:
             raise MappingError(str(problem)) from None
-        return replace(made, told=found.lines), hashlib.sha256(told.encode()).hexdigest()
+        made = replace(made, told=found.lines, own_keys=frozenset(dotted_keys(self._own(matching))))
+        return made, hashlib.sha256(told.encode()).hexdigest()
 
 
 def _check_format(made: ImportMapping, tree: Mapping[str, Any], reader: Reader) -> None:
-    """What only tables have, or only some of them."""
+    """What only tables have, or only some formats."""
     told: dict[str, object] = {"columns.trial": made.trial_column, "columns.time.rate": made.rate_hz}
     told |= {f"columns.{key}.pattern": column.pattern for key, column in made.columns.items()}
-    unused = [key for key, value in told.items() if value is not None and not reader.takes]
-    unused += [key for key in TABLE_KEYS if key in tree and key not in reader.takes]
+    unused = [key for key, value in told.items() if value is not None and not reader.is_table]
+    some = (*TABLE_KEYS, "gear_ratio")
+    unused += [key for key in some if key in tree and key not in reader.takes]
     if unused:
-        takers = [other for other in READERS.values() if other.takes]
-        names = ", ".join(each.name for each in takers if unused[0] not in TABLE_KEYS or unused[0] in each.takes)
-        raise UserError(f"{made.where}: {unused[0]} is for tables ({names}), the file is {reader.name}; leave it out")
+        key = unused[0]
+        names = ", ".join(
+            each.name for each in READERS.values() if (key in each.takes if key in some else each.is_table)
+        )
+        what = names if key == "gear_ratio" else f"tables ({names})"
+        raise UserError(f"{made.where}: {key} is for {what}, the file is {reader.name}; leave it out")
 
 
 def _with_text_keys(tree: object) -> object:
@@ -187,9 +199,10 @@ def _forces(file: Path, reader: Reader, mapping: ImportMapping, pca: float) -> I
         found = reader.pca(file, mapping)
         if found is not None and abs(found - pca) > _SAME_PCA:
             return
-        for pending in reader.trials(file, mapping):
+        own = reader.completed(file, mapping)
+        for pending in reader.trials(file, own):
             with contextlib.suppress(UserError):
-                trial = trial_of(pending.read(), mapping, file, isometric_scaling=False)
+                trial = trial_of(pending.read(), own, file, isometric_scaling=False)
                 force = isometric_force(Force(trial.force_time_s, trial.force_n), trial.facts.phases)
                 if force is not None and trial.facts.pca is not None and abs(trial.facts.pca - pca) <= _SAME_PCA:
                     yield force

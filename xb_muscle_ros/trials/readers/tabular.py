@@ -31,6 +31,8 @@ class TableReader(Reader):
     Names of trials have the table's own name, and what tells its trials apart, behind the file's.
     """
 
+    is_table = True
+
     @abc.abstractmethod
     def tables(self, path: Path, options: TableOptions) -> Iterator[Table]:
         """The tables of a file.
