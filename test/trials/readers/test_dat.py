@@ -177,6 +177,13 @@ def test_what_the_mapping_tells_goes_before_the_header(tmp_path: Path) -> None:
     assert read(file, reference_length="first_isometric").facts.reference_length_m == pytest.approx(1.25e-3)
 
 
+def test_two_lengths_of_the_fibre_are_told(tmp_path: Path) -> None:
+    (warning,) = read(dat(tmp_path / "a.dat", {"Initial Length": "1.10 mm"})).warnings
+    assert "has Fiber Length 1.250 mm and Initial Length 1.10 mm; L0 is the former; give --reference-length" in warning
+    assert read(dat(tmp_path / "b.dat", {"Initial Length": "1.251 mm"})).warnings == ()
+    assert read(tmp_path / "a.dat", reference_length="1.1 mm").warnings == ()
+
+
 def test_f0_has_to_be_known(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"the header has no Reference Force, so f0 is needed, .* --f0 '100 mN'"):
         read(dat(tmp_path / "a.dat"), f0=None)

@@ -33,10 +33,12 @@ _SECTION = re.compile(r"\s*\*\*\*\s*(.*?)\s*\*\*\*\s*")
 _DATA = "Force and Length Signals vs Time"
 _COLUMN = re.compile(r"\s*([^\s(](?:[^\t(]*[^\s(])?)\s*\(([^)\t]*)\)")
 _LENGTH, _FORCE, _RATE = "Fiber Length", "Reference Force", "A/D Sampling Rate"
+_INITIAL = "Initial Length"
+_SAME_LENGTH = 0.01
 # Times whose last digit is this much longer than a sample cannot tell samples apart.
 _COARSE = 1.2
 # Facts of the header that are noted.
-_NOTED = {"Fiber Length": "fibre", "Initial Length": "initial length", "Diameter": "diameter"}
+_NOTED = {_LENGTH: "fibre", _INITIAL: "initial length", "Diameter": "diameter"}
 _NOTED |= {"Initial Sarcomere Length": "sarcomeres", "Temperature": "temperature"}
 
 
@@ -210,6 +212,7 @@ def _recording(path: Path, mapping: ImportMapping) -> Recording:
             *rounded,
             *rate_warning(path, rate_hz, time_s),
             *reference_warning(path, mapping, _LENGTH, header.amount(_LENGTH)),
+            *_of_lengths(header, mapping),
             *(bath_warnings(path, header.protocol, time_s) if pca is not None else ()),
         ),
         None if planned is None else planned.test_start_s + shift_s,
@@ -231,6 +234,18 @@ def _times(header: DatHeader, rows: Rows, rate_hz: float | None) -> tuple[Array,
         f"{header.path}: times are rounded to {digit:.3g} {header.units[0]}, so that samples share them; they are "
         f"counted by the header's {rate_hz:g} Hz",
     )
+
+
+def _of_lengths(header: DatHeader, mapping: ImportMapping) -> Iterator[str]:
+    """A line where the header has two lengths of the fibre: laboratories take either for L0."""
+    length, initial = header.amount(_LENGTH), header.amount(_INITIAL)
+    if "reference_length" in mapping.own_keys or length is None or initial is None or length.unit != initial.unit:
+        return
+    if is_told(length) and is_told(initial) and abs(initial.value - length.value) > _SAME_LENGTH * length.value:
+        yield (
+            f"{header.path}: the header has {_LENGTH} {header.text(_LENGTH)} and {_INITIAL} {header.text(_INITIAL)}; "
+            "L0 is the former; give --reference-length if it is the latter"
+        )
 
 
 def _notes(header: DatHeader) -> Iterator[str]:

@@ -1,8 +1,9 @@
 """Trials from ``.ddf`` files of Aurora Scientific's Dynamic Muscle Control (DMC): stimulated muscles, in volts.
 
 A header tells the sample frequency, references, a calibration of each channel, and the protocol; then come samples
-in V. A channel is (V + offset) x scale in its unit, as workloopR reads it (Baliga and Senthivasan 2020, Journal of
-Open Source Software 5:1856; the files shipped with it are of DMC 5.3). ``Stim`` is 1 while there is a pulse.
+in V. A channel is (V + offset) x scale in its unit, as workloopR reads it (Baliga and Senthivasan, Journal of Open
+Source Software, doi 10.21105/joss.01856; the files shipped with it are of DMC 5.3). ``Stim`` is 1 while there is a
+pulse.
 """
 
 from __future__ import annotations
