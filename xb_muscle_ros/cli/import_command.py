@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from xb_muscle_ros.trials.readers.settings import ImportSettings
 
 # Names of the readers; the readers themselves take time to load.
-FORMATS = ("abf", "bag", "csv", "mat", "slc", "xlsx")
+FORMATS = ("abf", "bag", "csv", "dat", "ddf", "mat", "slc", "sto", "xlsx")
 # option: (key of the mapping and those above it, argument type, help)
 _OPTIONS: dict[str, tuple[str, type, str]] = {
     "--trial": ("trial", str, "name of the trial (default: the file's)"),
@@ -52,6 +52,7 @@ _OPTIONS: dict[str, tuple[str, type, str]] = {
     "--calcium-column": ("columns.calcium.column", str, "column of free calcium"),
     "--calcium-unit": ("columns.calcium.unit", str, "unit of calcium, or pCa"),
     "--pca": ("pca", float, "pCa of every file"),
+    "--gear-ratio": ("gear_ratio", float, "of a lever: length is divided by it, force multiplied with it (ddf)"),
     "--amplitude": ("amplitude_l0", float, "amplitude of the conditioning stretch, L0"),
     "--recovery": ("recovery_s", float, "time between shortening and test stretch, s"),
 }

@@ -18,7 +18,7 @@ from xb_muscle_ros.trials.mcap_records import MAGIC
 from xb_muscle_ros.trials.readers.assembly import trial_of
 from xb_muscle_ros.trials.readers.base import Pending
 from xb_muscle_ros.trials.readers.description import filled
-from xb_muscle_ros.trials.readers.registry import READERS, recording_suffixes
+from xb_muscle_ros.trials.readers.registry import READERS, is_recording, recording_suffixes
 from xb_muscle_ros.trials.readers.settings import ImportSettings, MappingError, Prepared
 from xb_muscle_ros.trials.trial import Trial
 
@@ -211,7 +211,7 @@ def _recordings_in(folder: Path, out: Path | None) -> Iterator[Path]:
                 yield from _recordings_in(path, out)
             elif folder.resolve() != out:
                 yield path
-        elif path.suffix.lower() in recording_suffixes():
+        elif is_recording(path):
             yield path
 
 

@@ -54,8 +54,12 @@ def propose(
     change = _length(made, reader, contents, found)
     _force(made, reader, found)
     calcium = _calcium(made, reader, found)
-    _reference(made, found, facts, change)
-    _f0(made, reader, found, facts)
+    for key in contents.in_header:
+        made.add(0, f"{key}:", "the header of each file tells it; what stands here goes before", active=False)
+    if "reference_length" not in contents.in_header:
+        _reference(made, found, facts, change)
+    if "f0" not in contents.in_header:
+        _f0(made, reader, found, facts)
     if not by_format:
         _facts(made, facts, name_pattern(paths), calcium)
     if apart:

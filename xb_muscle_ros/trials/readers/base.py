@@ -156,12 +156,14 @@ class Reader(abc.ABC):
         takes: keys of a mapping that are for some formats alone and have a use for this one.
         tells: whether its files tell a part of the mapping, see `told`.
         defaults: what a mapping need not say for this format; a tree as a mapping file has it.
+        in_header: of ``f0`` and ``reference_length``, what files of the format may tell themselves; see `completed`.
     """
 
     name: str
     suffixes: tuple[str, ...]
     begins: tuple[bytes, ...] = ()
     kind: str = FILE
+    in_header: tuple[str, ...] = ()
     takes: tuple[str, ...] = ()
     tells: bool = False
     defaults: Mapping[str, Any] = {}
@@ -177,6 +179,18 @@ class Reader(abc.ABC):
             UserError: the file cannot be read, or does not tell it, or a unit that is not known.
         """
         return Told()
+
+    def defaults_for(self, own: Mapping[str, Any]) -> Mapping[str, Any]:
+        """What a mapping with these keys of its own need not say."""
+        return self.defaults
+
+    def completed(self, path: Path, mapping: ImportMapping) -> ImportMapping:
+        """The mapping of one file, with what its header tells where the mapping tells nothing.
+
+        Raises:
+            UserError: the file cannot be read, or a fact is neither in the header nor in the mapping.
+        """
+        return mapping
 
     @abc.abstractmethod
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:

@@ -22,6 +22,13 @@ PCA_RANGE = (1.0, 12.0)
 # pCa is noted to a tenth.
 SAME_PCA = 0.05
 PCA_COLUMN = re.compile(r"p[ _-]?ca([^a-z0-9]|$)", re.IGNORECASE)
+_PCA_IN_WORDS = re.compile(r"p[ _-]?ca[ _=:-]*(\d+(?:[.,]\d+)?)", re.IGNORECASE)
+
+
+def pcas_in(words: str) -> list[float]:
+    """The pCa that a name or comment tells, in its order, each once; 61 is 6.1."""
+    told = [float(text.replace(",", ".")) for text in _PCA_IN_WORDS.findall(words)]
+    return list(dict.fromkeys(each / 10.0 if each > PCA_RANGE[1] else each for each in told))
 
 
 class Calcium(NamedTuple):

@@ -67,6 +67,7 @@ class Contents:
         facts: what the file tells beside its signals, by name, as text.
         others: what is there and is no signal, one line each.
         notes: what was wrong or found out, one line each.
+        in_header: of ``f0`` and ``reference_length``, what an import takes from the file itself.
     """
 
     format: str
@@ -75,3 +76,4 @@ class Contents:
     facts: Mapping[str, str] = dataclasses.field(default_factory=dict)
     others: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    in_header: tuple[str, ...] = ()

@@ -21,7 +21,7 @@ FACTS = ("pca", "amplitude_l0", "recovery_s")
 # Endings of files that tell a format and are no part of a name.
 ENDINGS = (
     *(".csv", ".tsv", ".txt", ".dat", ".asc", ".lvm", ".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
-    *(".mat", ".slc", ".abf", ".mcap", ".db3"),
+    *(".mat", ".slc", ".abf", ".ddf", ".sto", ".mot", ".mcap", ".db3"),
 )
 
 
@@ -99,6 +99,9 @@ class ImportMapping:
         factors: what a number found in the file name is multiplied with.
         isometric_fractions: isometric force of the matching isometric trials by pCa, F0; may be empty.
         isometric_source: where these come from.
+        gear_ratio: of a lever between motor and muscle; length is divided by it, force multiplied with it.
+        reference_note: where the reference length comes from.
+        own_keys: keys the mapping itself has, dotted as ``columns.force.unit``, rather than the reader for it.
     """
 
     where: str
@@ -132,6 +135,9 @@ class ImportMapping:
     factors: Mapping[str, float] = field(default_factory=dict)
     isometric_fractions: Mapping[float, float] = field(default_factory=dict)
     isometric_source: str = ""
+    gear_ratio: float | None = None
+    reference_note: str = "given"
+    own_keys: frozenset[str] = frozenset()
 
     @property
     def columns(self) -> dict[str, Column]:

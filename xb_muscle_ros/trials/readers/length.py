@@ -42,7 +42,7 @@ def read_length(draft: Draft, time_s: Array) -> Length:
         length_m = length_m - (0.0 if mapping.at_reference is None else mapping.at_reference.value) + reference_m
     give = 0.0 if mapping.servo_give is None else mapping.servo_give.value
     phases = detect_phases(time_s, length_m, facts.get("amplitude_l0"), facts.get("recovery_s"), reference_m, give)
-    how = "given"
+    how = mapping.reference_note
     if reference_m is None:
         how = "mean before the first change of length"
         isometric = length_m[initial_isometric(time_s, phases)]

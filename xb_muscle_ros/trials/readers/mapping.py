@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +25,23 @@ from xb_muscle_ros.trials.readers.columns import (
     read_stimulation,
     trial_column,
 )
-from xb_muscle_ros.trials.readers.description import FACTS, FIRST_ISOMETRIC, LENGTHS_OF, ImportMapping
+from xb_muscle_ros.trials.readers.description import FACTS, FIRST_ISOMETRIC, LENGTHS_OF, Column, ImportMapping
 from xb_muscle_ros.trials.readers.options import TABLE_KEYS, read_options
 from xb_muscle_ros.trials.readers.tree import Keys, check_keys
-from xb_muscle_ros.trials.readers.units import finite
+from xb_muscle_ros.trials.readers.units import Quantity, finite
 
 _NAMES = ("fibre", "trial", "data_set", "source")
-_PARTS = ("columns", "reference_length", "f0", "activation", "phases", "file_name", "isometric_scaling", "notch")
+_PARTS = (
+    "columns",
+    "reference_length",
+    "f0",
+    "gear_ratio",
+    "activation",
+    "phases",
+    "file_name",
+    "isometric_scaling",
+    "notch",
+)
 # Beyond these it is no muscle's F0, or its unit is wrong: a myofibril to the largest muscles, weak to strong.
 F0_RANGES = {"force": (1e-9, 1e5, "N"), "stress": (1e3, 2e6, "Pa")}
 
@@ -53,12 +63,15 @@ def load_mapping(path: Path) -> dict[str, Any]:
     return tree
 
 
-def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> ImportMapping:
+def build_mapping(
+    tree: Mapping[str, Any], where: str, kind: str = FILE, in_header: Collection[str] = ()
+) -> ImportMapping:
     """Check a tree of keys and make a mapping of it.
 
     Args:
         tree: as a mapping file has it, without ``per_file`` and ``format``.
         kind: `FILE` where signals are columns or channels, `BAG` where they are topics.
+        in_header: of ``f0`` and ``reference_length``, what files of the format may tell themselves.
 
     Raises:
         UserError: an unknown or missing key, an unknown unit, or a value that is not allowed.
@@ -102,9 +115,10 @@ def build_mapping(tree: Mapping[str, Any], where: str, kind: str = FILE) -> Impo
         factors=factors,
         isometric_fractions=_fractions(scaling),
         isometric_source=scaling.line("source"),
+        gear_ratio=_gear_ratio(keys),
     )
-    faults = (_length_faults, _force_faults, _calcium_faults, _pattern_faults)
-    for fault in itertools.chain.from_iterable(each(made) for each in faults):
+    units = (_length_faults(made, in_header), _force_faults(made, in_header))
+    for fault in itertools.chain(*units, _calcium_faults(made), _pattern_faults(made)):
         raise UserError(f"{where}: {fault}")
     return made
 
@@ -121,7 +135,16 @@ def _name(keys: Keys, key: str, default: str) -> str:
     return keys.text(key, "give a name, or leave it out") if key in keys else default
 
 
-def _length_faults(made: ImportMapping) -> Iterator[str]:
+def _gear_ratio(keys: Keys) -> float | None:
+    if "gear_ratio" not in keys:
+        return None
+    ratio = keys.number("gear_ratio")
+    if not 0.01 <= ratio <= 100.0:
+        raise UserError(f"{keys.where}: gear_ratio is {ratio:g}; allowed is 0.01 to 100")
+    return ratio
+
+
+def _length_faults(made: ImportMapping, in_header: Collection[str]) -> Iterator[str]:
     """What single keys cannot tell: units that need a reference."""
     kind, unit, reference, at = made.length.unit.kind, made.length.unit_name, made.reference_length, made.at_reference
     relative = kind == "relative length"
@@ -129,7 +152,8 @@ def _length_faults(made: ImportMapping) -> Iterator[str]:
         yield f"columns.length.at_reference has to be a {kind}, as the column is"
     if relative and reference is not None:
         yield f"lengths are in {unit}, so reference_length has no use; leave it out"
-    if (made.length_is_change or at is not None) and not relative and reference is None:
+    unknown = reference is None and "reference_length" not in in_header
+    if (made.length_is_change or at is not None) and not relative and unknown:
         what = f"a change in {unit}" if made.length_is_change else "that of more than the fibre"
         yield (
             f"the length column holds {what}, so the reference length has to be given, for example "
@@ -143,7 +167,7 @@ def _length_faults(made: ImportMapping) -> Iterator[str]:
         yield f"phases.servo_give has to be a {kind}, as the length column is"
 
 
-def _force_faults(made: ImportMapping) -> Iterator[str]:
+def _force_faults(made: ImportMapping, in_header: Collection[str]) -> Iterator[str]:
     force, f0 = made.force, made.f0
     if force is None or force.unit.kind == "relative force":
         if f0 is not None or made.f0_at_pca is not None:
@@ -152,11 +176,16 @@ def _force_faults(made: ImportMapping) -> Iterator[str]:
         return
     unit = force.unit_name
     if f0 is None:
-        if made.f0_at_pca is None:
+        if made.f0_at_pca is None and "f0" not in in_header:
             yield f"forces are in {unit}, so f0 is needed, for example 'f0: 100 {unit}' or --f0 '100 {unit}'"
         return
+    yield from f0_faults(f0, force)
+
+
+def f0_faults(f0: Quantity, force: Column) -> Iterator[str]:
+    """What is wrong with F0 for a column of force."""
     if f0.kind != force.unit.kind:
-        yield f"f0 is a {f0.kind}, the force column a {force.unit.kind}; give f0 in {unit}"
+        yield f"f0 is a {f0.kind}, the force column a {force.unit.kind}; give f0 in {force.unit_name}"
         return
     low, high, unit = F0_RANGES[f0.kind]
     if not low <= f0.value <= high:

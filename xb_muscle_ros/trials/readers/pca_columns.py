@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.readers.calcium import PCA_COLUMN, SAME_PCA
+from xb_muscle_ros.trials.readers.calcium import PCA_COLUMN, SAME_PCA, pcas_in
 from xb_muscle_ros.trials.readers.cells import number
 from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.readers.parts import Part
 from xb_muscle_ros.trials.readers.table import Table
-
-_PCA_IN_NAME = re.compile(r"p[ _-]?ca[ _=:-]*(\d+(?:[.,]\d+)?)", re.IGNORECASE)
 
 
 def check_pca(table: Table, mapping: ImportMapping, part: Part, pca: float | None) -> Iterator[str]:
@@ -29,13 +26,11 @@ def check_pca(table: Table, mapping: ImportMapping, part: Part, pca: float | Non
     patterns = [column.pattern for column in mapping.columns.values() if column.pattern is not None]
     others = []
     for name in table.header:
-        found = _PCA_IN_NAME.search(name)
-        if found is None:
+        stated = next(iter(pcas_in(name)), None)
+        if stated is None:
             if PCA_COLUMN.match(name):
                 _check_column(table, name, part, pca)
             continue
-        stated = float(found.group(1).replace(",", "."))
-        stated = stated / 10.0 if stated > 12.0 else stated  # 61 is 6.1
         if abs(stated - pca) > SAME_PCA and name == force:
             yield f"{table.where}: the force column is '{name}', but pCa is given as {pca:g}; check both"
         elif abs(stated - pca) > SAME_PCA and not any(pattern.fullmatch(name) for pattern in patterns):

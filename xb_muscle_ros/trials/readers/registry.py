@@ -9,12 +9,16 @@ from xb_muscle_ros.trials.readers.abf import AbfReader
 from xb_muscle_ros.trials.readers.bag import BagReader
 from xb_muscle_ros.trials.readers.base import Reader
 from xb_muscle_ros.trials.readers.csv import CsvReader
+from xb_muscle_ros.trials.readers.dat import DatReader
+from xb_muscle_ros.trials.readers.ddf import DdfReader
 from xb_muscle_ros.trials.readers.mat import MatReader
 from xb_muscle_ros.trials.readers.slc import SlcReader
+from xb_muscle_ros.trials.readers.sto import StoReader
 from xb_muscle_ros.trials.readers.xlsx import XlsxReader
 
 # In the order they are asked: text that is none of the others is a table.
-_ALL = (BagReader(), MatReader(), SlcReader(), AbfReader(), XlsxReader(), CsvReader())
+_INSTRUMENTS = (MatReader(), SlcReader(), AbfReader(), DatReader(), DdfReader(), StoReader())
+_ALL = (BagReader(), *_INSTRUMENTS, XlsxReader(), CsvReader())
 READERS: dict[str, Reader] = {reader.name: reader for reader in _ALL}
 
 
@@ -42,3 +46,12 @@ def reader_for(path: Path, name: str | None = None) -> Reader:
 def recording_suffixes() -> tuple[str, ...]:
     """Endings of the files that are looked for in folders."""
     return tuple(suffix for reader in READERS.values() for suffix in reader.suffixes)
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a file in a folder is to be read: by its ending, and its begin where others have the ending as well."""
+    suffix = path.suffix.lower()
+    try:
+        return any(suffix in reader.suffixes and reader.matches(path) for reader in READERS.values())
+    except OSError:
+        return True  # it is named when its turn comes

@@ -21,7 +21,7 @@ from xb_muscle_ros.trials.readers.left_out import Told, is_left_out
 from xb_muscle_ros.trials.readers.mapping import build_mapping
 from xb_muscle_ros.trials.readers.options import PATTERN, TABLE_KEYS, read_options
 from xb_muscle_ros.trials.readers.registry import READERS, reader_for
-from xb_muscle_ros.trials.readers.tree import Keys, merged
+from xb_muscle_ros.trials.readers.tree import Keys, dotted_keys, merged
 from xb_muscle_ros.trials.readers.units import Quantity
 
 # Raised when the same file and mapping would make another trial than before.
@@ -91,7 +91,8 @@ class ImportSettings:
         reader = reader_for(path, self._format)
         matching = tuple(i for i, (files, _) in enumerate(self._cases) if files.search(name_of(path)))
         told = reader.told(path, self._merged(reader, matching))
-        mapping, digest = self._mapping(reader, matching, told)
+        general, digest = self._mapping(reader, matching, told)
+        mapping = reader.completed(path, general)
         if mapping.f0_at_pca is None:
             return Prepared(path, reader, mapping, digest)
         suffix = path.suffix.lower()
@@ -118,10 +119,16 @@ class ImportSettings:
 
         return isometric_f0(folder, suffix, reader, mapping_of, (mapping.force.unit.kind, mapping.f0_at_pca))
 
+    def _own(self, matching: tuple[int, ...]) -> Mapping[str, Any]:
+        """Keys that the mapping and the options tell for files that some of the cases match."""
+        trees = (self._tree, *(self._cases[i][1] for i in matching), self._overrides)
+        own: Mapping[str, Any] = functools.reduce(merged, trees, {})
+        return own
+
     def _merge(self, reader: Reader, matching: tuple[int, ...]) -> Mapping[str, Any]:
         """Keys that hold for files of a format that some of the cases match."""
         trees = (self._tree, *(self._cases[i][1] for i in matching), self._overrides)
-        tree = functools.reduce(merged, trees, dict(reader.defaults))
+        tree = functools.reduce(merged, trees, dict(reader.defaults_for(self._own(matching))))
         try:
             read_options(Keys(tree, self._where), FACTS)  # a table is looked into before the rest is checked
         except UserError as problem:
@@ -133,17 +140,19 @@ class ImportSettings:
         tree = merged(found.tree, self._merged(reader, matching))
         told = json.dumps([VERSION, reader.name, self.isometric_scaling, _with_text_keys(tree)], sort_keys=True)
         try:
-            made = build_mapping(tree, self._where, reader.kind)
+            made = build_mapping(tree, self._where, reader.kind, reader.in_header)
             _check_format(made, tree, reader)
         except UserError as problem:
             raise MappingError(str(problem)) from None
-        return replace(made, told=found.lines), hashlib.sha256(told.encode()).hexdigest()
+        made = replace(made, told=found.lines, own_keys=frozenset(dotted_keys(self._own(matching))))
+        return made, hashlib.sha256(told.encode()).hexdigest()
 
 
 def _check_format(made: ImportMapping, tree: Mapping[str, Any], reader: Reader) -> None:
     """What only some formats have."""
     told: dict[str, object] = {"columns.trial": made.trial_column, "columns.time.rate": made.rate_hz}
-    keys = [*(key for key, value in told.items() if value is not None), *(key for key in TABLE_KEYS if key in tree)]
+    some = (*TABLE_KEYS, "gear_ratio")
+    keys = [*(key for key, value in told.items() if value is not None), *(key for key in some if key in tree)]
     unused = [(key, key) for key in keys if key not in reader.takes]
     patterns = [f"columns.{key}.pattern" for key, column in made.columns.items() if column.pattern is not None]
     unused += [(key, PATTERN) for key in patterns if PATTERN not in reader.takes]
@@ -212,9 +221,10 @@ def _forces(
         found = reader.pca(file, mapping)
         if found is not None and abs(found - pca) > _SAME_PCA:
             return
-        for pending in reader.trials(file, mapping):
+        own = reader.completed(file, mapping)
+        for pending in reader.trials(file, own):
             with contextlib.suppress(UserError):
-                trial = trial_of(pending.read(), mapping, file, isometric_scaling=False)
+                trial = trial_of(pending.read(), own, file, isometric_scaling=False)
                 force = isometric_force(Force(trial.force_time_s, trial.force_n), trial.facts.phases)
                 if force is not None and trial.facts.pca is not None and abs(trial.facts.pca - pca) <= _SAME_PCA:
                     yield force

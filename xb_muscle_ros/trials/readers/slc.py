@@ -21,6 +21,8 @@ from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal
 from xb_muscle_ros.trials.readers.cells import number
 from xb_muscle_ros.trials.readers.contents import Content, Contents
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled, name_of
+from xb_muscle_ros.trials.readers.lines import decoded, numbers, rate_warning
+from xb_muscle_ros.trials.readers.rows import SPACES, TextRows
 from xb_muscle_ros.trials.trial import Array
 
 MAGIC = b"SLCONTROL_DATA_FILE"
@@ -33,8 +35,6 @@ _DATA = "Data"
 _INFO = ("_FILE_INFO_START_", "_FILE_INFO_STOP_")
 # The motor is at rest at the begin; its mean position then is the length in the header.
 _REST_SAMPLES = 100
-# The header may name the rate another program was told; then the time column is right.
-_SAME_RATE = 0.01
 # Notes of the experimenter that tell the trials of a fibre apart, and their units.
 _NOTED = {"Species": "", "Muscle": "", "Temperature": " °C", "pH": " pH", "Drug": ""}
 _PCA_IN_NAME = re.compile(r"(\d\d)pCa", re.IGNORECASE)
@@ -103,7 +103,7 @@ def read_header(path: Path) -> SlcHeader:
         with path.open("rb") as file:
             lines = []
             for raw in file:
-                lines.append(_text(raw))
+                lines.append(decoded(raw).strip())
                 if lines[-1] == _DATA:
                     break
     except OSError as problem:
@@ -135,26 +135,13 @@ def read_columns(header: SlcHeader) -> dict[str, Array]:
             f"{header.path} has {len(rows)} rows; its header tells of {points} data points, so it was cut short; "
             "copy it again"
         )
-    table = _numbers(header, rows[:points], names)
+    if not rows[:points]:
+        raise UserError(f"{header.path} has no rows below its header; copy it again")
+    cells = TextRows(
+        [decoded(row).strip() for row in rows[:points]], range(header.lines + 1, 1 + header.lines + points), SPACES
+    )
+    table = numbers(header.path, cells, names)
     return {name: table[:, i] for i, name in enumerate(names)}
-
-
-def _numbers(header: SlcHeader, rows: list[bytes], names: tuple[str, ...]) -> Array:
-    cells = [row.split() for row in rows]
-    try:
-        table: Array = np.array(cells, dtype=np.float64)  # ragged rows and words are ValueErrors
-        if table.shape == (len(rows), len(names)):
-            return table
-    except ValueError:
-        pass
-    for i, row in enumerate(cells):
-        where = f"{header.path}, line {header.lines + i + 1}"
-        if len(row) != len(names):
-            raise UserError(f"{where} has {len(row)} cells; needed are {len(names)}: {', '.join(names)}")
-        for name, text in zip(names, (cell.decode("latin-1") for cell in row), strict=True):
-            if math.isnan(number(text)) and text.lower() != "nan":
-                raise UserError(f"{where}, column '{name}' holds '{text}'; needed is a number")
-    raise UserError(f"{header.path} has no rows below its header; copy it again")
 
 
 def _header(path: Path, lines: list[str]) -> SlcHeader:
@@ -174,13 +161,6 @@ def _header(path: Path, lines: list[str]) -> SlcHeader:
             recorded = line if tag == "_RECORD_TIME_" else recorded
         tag = line if line.startswith("_") else tag
     return SlcHeader(path, info, values, recorded, len(lines))
-
-
-def _text(raw: bytes) -> str:
-    try:
-        return raw.decode("utf-8").strip()
-    except UnicodeDecodeError:
-        return raw.decode("latin-1").strip()
 
 
 class SlcReader(Reader):
@@ -292,12 +272,5 @@ def _notes(header: SlcHeader) -> tuple[str, ...]:
 
 
 def _rate_warning(header: SlcHeader, time_s: Array) -> tuple[str, ...]:
-    if "sampling_rate_(Hz)" not in header.values or time_s.size < 2:
-        return ()
-    stated_hz = header.number("sampling_rate_(Hz)")
-    found_hz = 1.0 / float(np.median(np.diff(time_s)))
-    if abs(stated_hz - found_hz) <= _SAME_RATE * found_hz:
-        return ()
-    return (
-        f"{header.path}: the header says {stated_hz:g} Hz, the time column {found_hz:g} Hz; the time column is used",
-    )
+    stated = "sampling_rate_(Hz)" in header.values
+    return rate_warning(header.path, header.number("sampling_rate_(Hz)") if stated else None, time_s)

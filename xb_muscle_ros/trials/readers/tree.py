@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from xb_muscle_ros.errors import UserError, suggest
@@ -114,3 +114,12 @@ def merged(under: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
         else:
             tree[key] = value
     return tree
+
+
+def dotted_keys(tree: Mapping[str, Any], above: str = "") -> Iterator[str]:
+    """All keys of a tree with those above them, ``columns.force.unit``, but for those that are null."""
+    for key, value in tree.items():
+        if value is not None:
+            yield f"{above}{key}"
+        if isinstance(value, Mapping):
+            yield from dotted_keys(value, f"{above}{key}.")

@@ -1,0 +1,141 @@
+"""Trials from OpenSim's storage and motion files (``.sto``, ``.mot``): one table below a header that ends by itself.
+
+Header lines are ``key=value`` (``nRows``, ``nColumns``, ``inDegrees``, ...; ``datarows`` and ``datacolumns`` in older
+motion files) up to ``endheader``; then come the names of the columns, ``time`` among them, and the rows. Times are in
+s, lengths in m, forces in N, as everywhere in OpenSim.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording
+from xb_muscle_ros.trials.readers.contents import Contents
+from xb_muscle_ros.trials.readers.description import ImportMapping, filled
+from xb_muscle_ros.trials.readers.lines import Rows, Text, amount, read_lines, read_rows
+from xb_muscle_ros.trials.readers.named_columns import NamedColumn, contents_of, signals_of
+
+_NEEDED = "a storage file of OpenSim"
+_END = "endheader"
+_ROWS, _COLUMNS = ("nrows", "datarows"), ("ncolumns", "datacolumns")
+
+
+@dataclass(frozen=True)
+class StoHeader:
+    """What stands above the rows.
+
+    Attributes:
+        title: the first line, where that is no key; empty where it is.
+        facts: values by key in small letters.
+        names: of the columns.
+        first: index of the line the rows begin with.
+    """
+
+    path: Path
+    title: str
+    facts: Mapping[str, str]
+    names: tuple[str, ...]
+    first: int
+
+    def count(self, keys: tuple[str, ...]) -> int | None:
+        """A number of rows or columns; None where the header does not tell it."""
+        told = next((self.facts[key] for key in keys if key in self.facts), None)
+        value = amount(told).value if told is not None else -1.0
+        return int(value) if value >= 0.0 and value.is_integer() else None
+
+
+def read_header(path: Path, text: Text) -> StoHeader:
+    """Read what stands above the rows.
+
+    Raises:
+        UserError: the file has no ``endheader``, ends with it, or names other columns than it counts.
+    """
+    end = next((i for i, line in enumerate(text.lines) if line.strip().casefold() == _END), None)
+    if end is None:
+        raise UserError(f"{path} has no line '{_END}'; needed is {_NEEDED}; copy it again")
+    pairs = [line.partition("=") for line in text.lines[:end]]
+    facts = {key.strip().casefold(): value.strip() for key, sign, value in pairs if sign}
+    facts |= {
+        words[0].casefold(): words[1]
+        for key, sign, _ in pairs
+        if not sign and len(words := key.split()) == 2 and words[0].casefold() in _ROWS + _COLUMNS
+    }
+    title = text.lines[0].strip() if end > 0 and not pairs[0][1] else ""
+    at = next((i for i in range(end + 1, len(text.lines)) if text.lines[i].strip()), None)
+    if at is None:
+        raise UserError(f"{path} ends within its header: no columns are named below '{_END}'; copy it again")
+    line = text.lines[at]
+    names = tuple(cell.strip() for cell in line.split("\t") if cell.strip()) if "\t" in line else tuple(line.split())
+    header = StoHeader(path, title, facts, names, at + 1)
+    told = header.count(_COLUMNS)
+    if told is not None and told != len(names):
+        raise UserError(
+            f"{path}, line {at + 1} names {len(names)} columns, the header tells of {told}; mend one of them, or copy "
+            "the file again"
+        )
+    return header
+
+
+class StoReader(Reader):
+    """One trial to a file, which is a muscle; the mapping names the columns of length and force."""
+
+    name = "sto"
+    suffixes = (".sto", ".mot")
+    defaults: Mapping[str, Any] = {
+        "fibre": "{file}",
+        "columns": {"time": {"column": "time", "unit": "s"}, "length": {"unit": "m"}},
+    }
+    takes = ("decimal",)
+
+    def defaults_for(self, told: Mapping[str, Any]) -> Mapping[str, Any]:
+        """With the unit of force where the mapping names a column of it."""
+        columns = told.get("columns")
+        if not isinstance(columns, Mapping) or columns.get("force") is None:
+            return self.defaults
+        return {**self.defaults, "columns": {**self.defaults["columns"], "force": {"unit": "N"}}}
+
+    def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
+        """The one trial of the file."""
+        yield Pending(filled(mapping.trial, path), lambda: _recording(path, mapping))
+
+    def contents(self, path: Path) -> Contents:
+        """All columns; the format tells no units but that of time."""
+        text = read_lines(path, _NEEDED)
+        header = read_header(path, text)
+        rows = read_rows(path, text, header.first, header.names)
+        columns = {name: NamedColumn(rows.values[:, i], "s" if i == 0 else "") for i, name in enumerate(header.names)}
+        signals = contents_of(columns, self.defaults, rows.at)
+        notes = (*rows.notices, *_of_rows(header, rows))
+        return Contents(f"OpenSim {header.title}".strip(), signals, facts=header.facts, notes=notes)
+
+
+def _recording(path: Path, mapping: ImportMapping) -> Recording:
+    text = read_lines(path, _NEEDED)
+    header = read_header(path, text)
+    rows = read_rows(path, text, header.first, header.names, mapping.table.decimal)
+    used = [column.name for column in mapping.columns.values()]
+    twice = next((name for name in used if header.names.count(name) > 1), None)
+    if twice is not None:
+        raise UserError(f"{path} has more than one column '{twice}'; rename one")
+    columns = {name: NamedColumn(rows.values[:, i], "") for i, name in enumerate(header.names)}
+    signals = signals_of(path, mapping, columns, rows.at, with_units=False)
+    return Recording(
+        str(path),
+        filled(mapping.trial, path),
+        signals,
+        mapping.facts_of(path),
+        (f"OpenSim storage{f' {header.title}' if header.title else ''}",),
+        (*rows.notices, *_of_rows(header, rows)),
+    )
+
+
+def _of_rows(header: StoHeader, rows: Rows) -> tuple[str, ...]:
+    told = header.count(_ROWS)
+    if told is None or told == len(rows.lines):
+        return ()
+    why = "the file was cut short" if len(rows.lines) < told else "rows were added"
+    return (f"{header.path} has {len(rows.lines)} rows, its header tells of {told}; {why}; the rows are used",)
