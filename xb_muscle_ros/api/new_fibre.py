@@ -45,7 +45,8 @@ def new_fibre(
         area: cross-section, text such as ``'0.005 mm2'`` or a number in m²; set beside F0, it tells the stress.
         temperature: of the experiments, °C. Rates are scaled to it only with `q10`.
         q10: factor of all rates per 10 K.
-        species, muscle: in words; the package's fibres are of rat soleus.
+        species: in words; the package's fibres are of rat soleus.
+        muscle: in words.
         overwrite: replace a file of this name.
         tell: hears each line on where values come from; None: a `DataWarning` each.
 

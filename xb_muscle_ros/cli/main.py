@@ -16,7 +16,7 @@ from xb_muscle_ros.errors import DataWarning, UserError
 COMMANDS = {
     "demo": "replay the recordings of fibre 18Dec2017a offline and through the node",
     "inspect": "say what is in a file, and which mapping would import it",
-    "import": "make bags of recordings: CSV, MATLAB, SLControl, Aurora, OpenSim, other bags",
+    "import": "make bags of recordings: tables, Excel, MATLAB, Aurora, Axon, SLControl, OpenSim, other bags",
     "record": "record live topics into a bag",
     "simulate": "simulate trials of a protocol into bags, and read them off",
     "export": "write trials of bags as CSV, Parquet or OpenSim tables",
