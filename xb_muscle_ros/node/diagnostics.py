@@ -37,6 +37,7 @@ class Report:
         refusing: see `xb_muscle_ros.node.inlet.Inlet`.
         lost: messages that did not come since the last reset, in words, by topic.
         lost_new: how many since the last report, by topic.
+        driven_by: what the fibres are sent, ``length`` or ``load``.
     """
 
     node: str
@@ -60,6 +61,7 @@ class Report:
     refusing: Mapping[tuple[str, str], Refused] = field(default_factory=dict)
     lost: Mapping[str, str] = field(default_factory=dict)
     lost_new: Mapping[str, int] = field(default_factory=dict)
+    driven_by: str = "length"
 
 
 def status_name(node: str) -> str:
@@ -97,11 +99,11 @@ def _verdict(report: Report) -> tuple[bytes, str]:
     if status.on_timeout:
         # The force goes on, but is no longer an answer to anything.
         level = DiagnosticStatus.ERROR
-        remarks.append(f"no length {since}: {status.on_timeout}")
+        remarks.append(f"no {report.driven_by} {since}: {status.on_timeout}")
     elif not status.waiting and 0.0 < report.timeout_s < (age_s or 0.0):
-        remarks.append(f"no length {since}")
+        remarks.append(f"no {report.driven_by} {since}")
     elif report.timeouts_new:
-        remarks.append(f"no length in time {report.timeouts_new} times")
+        remarks.append(f"no {report.driven_by} in time {report.timeouts_new} times")
     lasting = [(*key, entry) for key, entry in report.refusing.items() if report.now_s - entry.since_s >= _LASTING_S]
     for topic, whose, entry in lasting[:1]:
         of, more = f" of {whose}" if whose else "", f" ({len(lasting) - 1} more likewise)" if lasting[1:] else ""

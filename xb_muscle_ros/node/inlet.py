@@ -35,7 +35,7 @@ class Refused(NamedTuple):
 
 
 class Inlet:
-    """Takes ``muscle/length`` and ``muscle/calcium``; a message may name some of the fibres.
+    """Takes ``muscle/length`` or ``muscle/load``, and ``muscle/calcium``; a message may name some of the fibres.
 
     What is wrong with the message refuses it whole, what is wrong with one fibre's value refuses that.
 
@@ -43,7 +43,7 @@ class Inlet:
         open: whether messages are taken; while closed they are dropped.
         refused: how often input was refused, by reason; each fibre's value counts.
         ignored_names: names that belong to no fibre here.
-        last_length_s: steady time of the last length sample that was taken, s.
+        last_length_s: steady time of the last sample of length or load that was taken, s.
         refusing: where nothing is taken any more: by topic, and name of the fibre, or nothing for the whole message and
             in a node of one fibre.
     """
@@ -93,6 +93,17 @@ class Inlet:
         if troubles or self.refusing:
             self._tell("length", places.fibres, troubles, troubles)
 
+    def take_load(self, message: Joints) -> None:
+        """Callback of ``muscle/load``: effort N."""
+        places = self._places("load", message, "effort") if self.open else None
+        if places is None:
+            return
+        troubles = self._taker.take_length(message.stamp_ns, places.fibres, _chosen(message.effort, places), None)
+        if len(troubles) < places.fibres.size:
+            self.last_length_s = time.monotonic()
+        if troubles or self.refusing:
+            self._tell("load", places.fibres, troubles, troubles)
+
     def take_calcium(self, message: Joints, latched: bool = False) -> None:
         """Callback of ``muscle/calcium``: position µM; `latched` where a publisher kept it for who listens late."""
         places = self._places("calcium", message) if self.open else None
@@ -117,10 +128,10 @@ class Inlet:
         if told or self.refusing:
             self._tell("calcium", places.fibres, troubles, told)
 
-    def _places(self, topic: str, message: Joints) -> Places | None:
+    def _places(self, topic: str, message: Joints, field: str = "position") -> Places | None:
         """Where the fibres of a message are; None where it has nothing for any of them, or is refused."""
         try:
-            places = self._names.places(message.names, message.position.size, "position")
+            places = self._names.places(message.names, getattr(message, field).size, field)
             if places.new:
                 self.ignored_names += len(places.new)
                 here = f"fibre{'s' if len(self._fibres) > 1 else ''} {enumerated(self._fibres)}"

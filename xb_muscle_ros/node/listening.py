@@ -21,25 +21,26 @@ from xb_muscle_ros.node.traffic import as_bytes, hearing
 
 
 class Listening:
-    """Subscriptions of ``muscle/calcium`` and ``muscle/length``, until `close`.
+    """Subscriptions of ``muscle/calcium`` and of ``muscle/length`` or ``muscle/load``, until `close`.
 
     Attributes:
-        arrivals: of each topic, by ``calcium`` and ``length``.
+        arrivals: of each topic, by ``calcium`` and ``length`` or ``load``.
     """
 
-    def __init__(self, node: Any, inlet: Inlet, mode: str) -> None:
-        """Subscribe; messages are taken while the inlet is open."""
+    def __init__(self, node: Any, inlet: Inlet, mode: str, driven_by: str = "length") -> None:
+        """Subscribe; messages are taken while the inlet is open; `driven_by` is ``length`` or ``load``."""
         self._node = node
         self._inlet = inlet
         self._mode = mode
         self._bytes = as_bytes(node.get_logger())
         self._latched: Latched | None = Latched(node, "muscle/calcium", self._take_latched)
+        take = inlet.take_length if driven_by == "length" else inlet.take_load
         self.arrivals = {
             "calcium": Arrivals(hearing(inlet.take_calcium, self._bytes, partial(inlet.refuse, "calcium")), self.look),
-            "length": Arrivals(hearing(inlet.take_length, self._bytes, partial(inlet.refuse, "length"))),
+            driven_by: Arrivals(hearing(take, self._bytes, partial(inlet.refuse, driven_by))),
         }
-        # Calcium first: where both wait, it is then taken before the length that needs it.
-        calcium, length = (self._subscribe(topic) for topic in ("calcium", "length"))
+        # Calcium first: where both wait, it is then taken before the length or load that needs it.
+        calcium, length = (self._subscribe(topic) for topic in self.arrivals)
         self._subscriptions = (calcium, length)
         if calcium.qos_profile.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL:
             # The user wants it so: it hears what is kept by itself, and volatile publishers not at all.

@@ -1,4 +1,4 @@
-"""Lockstep: one step per length sample, by the samples' own stamps, so that the same input gives the same bits."""
+"""Lockstep: one step per sample, by the samples' own stamps, so that the same input gives the same bits."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.node.control import LENGTH, Control
 from xb_muscle_ros.node.names import Indices, front
 from xb_muscle_ros.node.plan import Divided, Plan, States, numbers
 from xb_muscle_ros.node.rules import Counts, Refusal, Trouble, scale_of
@@ -18,7 +19,7 @@ from xb_muscle_ros.node.timeline import Timeline, history
 
 
 class Lockstep:
-    """Answers every length message at once, with the forces of the fibres it names; the others do not move.
+    """Answers every message of length or load at once, with the forces of the fibres it names; the others do not move.
 
     Forces are those that a node with the one fibre would give. Fibres have one `Timeline` together as long as they take
     the same samples, which a reset makes them begin anew; those that go the same way are stepped in one call.
@@ -30,7 +31,13 @@ class Lockstep:
     """
 
     def __init__(
-        self, batch: MuscleBatch, emit: Emit, log: Log, simulated_time: Callable[[], bool], threads: int = 1
+        self,
+        batch: MuscleBatch,
+        emit: Emit,
+        log: Log,
+        simulated_time: Callable[[], bool],
+        threads: int = 1,
+        control: Control = LENGTH,
     ) -> None:
         """Keep what is needed.
 
@@ -39,8 +46,10 @@ class Lockstep:
             emit: called for every answer.
             log: told when time went back.
             simulated_time: whether time may go back.
+            control: what samples ask for.
         """
         self.batch = batch
+        self._control = control
         self.threads = threads
         self.counts = Counts()
         self._answers = 0
@@ -111,17 +120,17 @@ class Lockstep:
                 troubles += [Trouble(i, refusal) for i in timeline.fibres]
         return troubles
 
-    def take_length(
-        self, stamp: int, fibres: Indices, position_m: Floats, velocity_m_per_s: Floats | None
-    ) -> list[Trouble]:
-        """Step some fibres to lengths (m) of one stamp (ns) and emit their answers in one; velocity is not needed here.
+    def take_length(self, stamp: int, fibres: Indices, given: Floats, velocity_m_per_s: Floats | None) -> list[Trouble]:
+        """Step some fibres to lengths (m) or loads (N) of one stamp (ns) and emit their answers in one.
+
+        Velocity is not needed here.
 
         Returns what was refused, and what failed and stays stopped until the next reset; other fibres do not mind.
         """
         del velocity_m_per_s
         troubles: list[Trouble] = []
         plans = []
-        for timeline, values in self._shares(fibres, position_m):
+        for timeline, values in self._shares(fibres, given):
             plan = self._plan(timeline, stamp, values, troubles)
             if plan is not None:
                 plans.append((timeline, plan))
@@ -136,18 +145,19 @@ class Lockstep:
             chosen = None if done.size == len(self._names) else done
             self._answers += 1
             scales = self._scales if chosen is None else self._scales[chosen]
-            self._emit(stamp, chosen, outputs(self.batch, chosen, states), scales)
+            self._emit(stamp, chosen, outputs(self.batch, chosen, states), scales, *self._control.answers(states))
         return troubles
 
     def status(self) -> Status:
         """How it goes, over all fibres."""
         waiting = sorted(i for timeline in self._timelines if timeline.run.states is None for i in timeline.fibres)
         faults = {i: timeline.run.fault for timeline in self._timelines if timeline.run.fault for i in timeline.fibres}
-        what = f"{front(self._names, waiting)}waiting for the first length sample and its calcium"
+        what = f"{front(self._names, waiting)}waiting for the first {self._control.topic} sample and its calcium"
         return Status(self._answers, self._violations, stopped(self._names, faults), what if waiting else "")
 
     def _timeline(self, fibres: Indices) -> Timeline:
-        return Timeline(fibres.tolist(), self._next_scales[fibres], self.counts, self._simulated_time, self._note_back)
+        scales = self._next_scales[fibres]
+        return Timeline(fibres.tolist(), scales, self.counts, self._simulated_time, self._note_back, self._control)
 
     def _shares(self, fibres: Indices, values: Floats) -> Iterator[tuple[Timeline, Floats]]:
         """Timelines of the fibres that a message names, and their values; those that it names in part are parted."""
@@ -206,7 +216,7 @@ class Lockstep:
         failed: dict[int, UserError] = {}
         for k, i in enumerate(timeline.fibres):
             try:
-                states.append(plan.step(self.batch, i, k))
+                states.append(plan.step(self.batch, i, k, self._control))
             except UserError as error:
                 self._violations += isinstance(error, StateViolation)
                 failed[i] = error
@@ -233,17 +243,17 @@ class Lockstep:
         if any(plan.states is None or plan.dt_s != dt_s for _, plan in plans):
             return None
         if len(plans) == 1:
-            states, change, calcium = plans[0][1].states, plans[0][1].change_l0, plans[0][1].calcium_um
+            states, goals, calcium = plans[0][1].states, plans[0][1].goal, plans[0][1].calcium_um
             assert states is not None
             states = np.asarray(states)
         else:
-            change, calcium = np.empty((2, count))
+            goals, calcium = np.empty((2, count))
             states = np.empty((count, len(self.batch.state_names)))
             for timeline, plan in plans:
                 at = timeline.places
-                states[at], change[at], calcium[at] = plan.states, plan.change_l0, plan.calcium_um
+                states[at], goals[at], calcium[at] = plan.states, plan.goal, plan.calcium_um
         try:
-            return self.batch.step(states, change, calcium, dt_s)
+            return self._control.step_all(self.batch, states, goals, calcium, dt_s)
         except UserError:
             return None
 

@@ -1,4 +1,4 @@
-"""The muscle node: length and calcium in, force out; a lifecycle node."""
+"""The muscle node: length and calcium in, force out, or load in and length out; a lifecycle node."""
 
 # rclpy has types for a part of itself only.
 # mypy: allow-untyped-calls, allow-subclassing-any
@@ -21,6 +21,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.strain_bins import wide_bins_line
+from xb_muscle_ros.node.control import CONTROLS
 from xb_muscle_ros.node.graph import Namesakes, survive_wrong_transitions
 from xb_muscle_ros.node.inlet import Inlet
 from xb_muscle_ros.node.listening import Listening, overridable
@@ -54,13 +55,14 @@ class MuscleNode(LifecycleNode):
         self.failure: UserError | None = None
         self._gate = ParameterGate(self, self._use_fibre, self._use_settings)
         self._mode: str = self._gate.value("mode")
+        self._control = CONTROLS[self._gate.value("control")]
         self._stepping: Lockstep | Realtime | None = None
         self._inlet: Inlet | None = None
         self._listening: Listening | None = None
         # While the program starts the node, the caller tells what is wrong.
         self._starting = False
         self._outlets: list[Any] = []
-        self._reporter = Reporter(self, self._mode)
+        self._reporter = Reporter(self, self._mode, self._control.topic)
         self.create_service(Trigger, "~/reset", self._on_reset)
         self._state_file = StateFile(
             self._mode, lambda: str(self._gate.value("state_file")), lambda: self._stepping, self.get_logger()
@@ -129,7 +131,7 @@ class MuscleNode(LifecycleNode):
         self._set_active(True)
         if self._stepping is not None:
             self._stepping.start()
-        self.get_logger().info("active: waiting for muscle/calcium and muscle/length")
+        self.get_logger().info(f"active: waiting for muscle/calcium and muscle/{self._control.topic}")
         return result
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -156,29 +158,29 @@ class MuscleNode(LifecycleNode):
         return super().on_error(state)
 
     def _connect(self, fibres: Sequence[Fibre]) -> None:
+        by_load = self._control.topic == "load"
         self._outlets = [
             self.create_lifecycle_publisher(JointState, f"muscle/{topic}", _output_qos(), **overridable())
-            for topic in ("force", "moments")
+            for topic in ("force", "moments", *(("length",) if by_load else ()))
         ]
         names = [fibre.name for fibre in fibres]
-        force, moments = self._outlets
-        outlet = OutputMessages(names, force, moments, as_bytes())
+        force, moments, *length = self._outlets
+        outlet = OutputMessages(names, force, moments, as_bytes(), *length)
         self._stepping = stepping = self._made(fibres, outlet)
         self._inlet = inlet = Inlet(names, stepping, self.get_logger())
-        self._listening = Listening(self, inlet, self._mode)
+        self._listening = Listening(self, inlet, self._mode, self._control.topic)
         self._reporter.watch(fibres, stepping, inlet, outlet, self._listening.arrivals)
 
     def _made(self, fibres: Sequence[Fibre], outlet: OutputMessages) -> Lockstep | Realtime:
         batch = MuscleBatch(fibres)
-        if len(batch) > 1:
-            # One fibre goes by itself, and is warm; no tick shall wait for a compiler.
-            batch.warm()
         # The first settling loads what later ones need.
         batch.muscles[0].settle(0.0, 0.1)
+        self._control.warm(batch)
         log = self.get_logger()
         if self._mode == "lockstep":
-            return Lockstep(batch, outlet.publish, log, self._simulated_time, self._gate.value("threads"))
-        return Realtime(batch, self._settings(), outlet.publish, self._now_ns, log, self._simulated_time)
+            threads = self._gate.value("threads")
+            return Lockstep(batch, outlet.publish, log, self._simulated_time, threads, self._control)
+        return Realtime(batch, self._settings(), outlet.publish, self._now_ns, log, self._simulated_time, self._control)
 
     def _now_ns(self) -> int:
         return int(self.get_clock().now().nanoseconds)
@@ -240,7 +242,9 @@ class MuscleNode(LifecycleNode):
             self._listening.reset()
         response.success = True
         constants = _constants(self._gate.fibres)
-        response.message = f"state forgotten after {account}; the next length sample settles anew; {constants}"
+        response.message = (
+            f"state forgotten after {account}; the next {self._control.topic} sample settles anew; {constants}"
+        )
         return response
 
     def _report(self) -> None:

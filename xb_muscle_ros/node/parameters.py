@@ -39,9 +39,15 @@ NODE_PARAMETERS: Mapping[str, Row] = {
     "autostart": Row(True, "configure and activate without being asked", START),
     "mode": Row(
         "realtime",
-        "realtime: steps at rate_hz by the steady clock; lockstep: one step per length message, by its stamp",
+        "realtime: steps at rate_hz by the steady clock; lockstep: one step per length (or load) message, by its stamp",
         START,
         choices=("realtime", "lockstep"),
+    ),
+    "control": Row(
+        "length",
+        "length: length in, force out; force: load in, length out (force clamp)",
+        START,
+        choices=("length", "force"),
     ),
     "fiber_file": Row("", "fibre file, path or packaged fibre name; empty: parameters hold it", UNCONFIGURED),
     "fiber_files": Row(("",), "one fibre file for each of many fibres, in order; empty: not many", UNCONFIGURED),
@@ -65,14 +71,14 @@ NODE_PARAMETERS: Mapping[str, Row] = {
     ),
     "timeout_s": Row(
         0.0,
-        "age of the newest length sample beyond which on_timeout acts; 0: no age is too old",
+        "age of the newest length (or load) sample beyond which on_timeout acts; 0: no age is too old",
         ALWAYS,
         unit="s",
         bounds=(0.0, 3600.0),
     ),
     "on_timeout": Row(
         ISOMETRIC,
-        "hold: length of the last sample; isometric: that of the fibre; decay: isometric, calcium falls to zero",
+        "hold: the last sample goes on; isometric: the fibre keeps its length; decay: isometric, calcium falls to zero",
         ALWAYS,
         choices=(HOLD, ISOMETRIC, DECAY),
     ),

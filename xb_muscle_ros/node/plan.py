@@ -1,4 +1,4 @@
-"""A length sample that fibres in lockstep are to be stepped to, and which of them cannot be."""
+"""A sample that fibres in lockstep are to be stepped to, and which of them cannot be."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from xb_muscle_ros.models.batch import MuscleBatch
+from xb_muscle_ros.node.control import Control
 from xb_muscle_ros.node.names import Indices
 from xb_muscle_ros.node.rules import Refusal
 from xb_muscle_ros.node.stepping import Flags, Floats
@@ -43,38 +44,38 @@ class Divided(Exception):
 
 
 class Plan(NamedTuple):
-    """A length sample that can be integrated.
+    """A sample that can be integrated.
 
     Attributes:
         stamp, asked: of the sample, and until when calcium was asked for, ns.
-        change_l0, calcium_um: to step to, and with.
+        goal, calcium_um: to step to (length change, L0, or load, F0), and with.
         states: to step from, shape (fibres, n); None: settle.
         dt_s: from the last sample; 0 where there is none.
     """
 
     stamp: int
     asked: int
-    change_l0: Numbers
+    goal: Numbers
     calcium_um: Numbers
     states: States | None
     dt_s: float
 
     def picked(self, which: Indices) -> Plan:
         """The same for fibres in some places."""
-        change, calcium = (numbers(np.atleast_1d(values)[which]) for values in (self.change_l0, self.calcium_um))
+        goal, calcium = (numbers(np.atleast_1d(values)[which]) for values in (self.goal, self.calcium_um))
         states = None if self.states is None else np.asarray(self.states)[which]
-        return self._replace(change_l0=change, calcium_um=calcium, states=states)
+        return self._replace(goal=goal, calcium_um=calcium, states=states)
 
-    def step(self, batch: MuscleBatch, fibre: int, place: int) -> Floats:
+    def step(self, batch: MuscleBatch, fibre: int, place: int, control: Control) -> Floats:
         """State at its end, shape (n,), of a fibre of the batch that is in this place here.
 
         Raises:
-            UserError, StateViolation: see `Muscle`.
+            UserError, StateViolation: see `Control`.
         """
-        muscle, change, calcium = batch.muscles[fibre], number(self.change_l0, place), number(self.calcium_um, place)
+        muscle, goal, calcium = batch.muscles[fibre], number(self.goal, place), number(self.calcium_um, place)
         if self.states is None:
-            return muscle.settle(change, calcium)
-        return muscle.step(self.states[place], change, calcium, self.dt_s)
+            return control.settle(muscle, goal, calcium)
+        return control.step(muscle, self.states[place], goal, calcium, self.dt_s)
 
 
 def let_pass(good: Any, refusal: Callable[..., Refusal], *values: Numbers) -> None:

@@ -12,11 +12,12 @@ import numpy as np
 from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
+from xb_muscle_ros.node.control import LENGTH, Control
 from xb_muscle_ros.node.names import front
 from xb_muscle_ros.node.rules import Counts, Scale, scale_of
 from xb_muscle_ros.node.samples import Samples
 from xb_muscle_ros.node.status import Account, Log, Snapshot, Status, no_state
-from xb_muscle_ros.node.stepping import Emit, Flags, Floats, outputs, step, stopped, use_threads
+from xb_muscle_ros.node.stepping import Emit, Flags, Floats, outputs, stopped, use_threads
 from xb_muscle_ros.node.ticker import Ticker
 from xb_muscle_ros.node.watchdog import Watchdog, unfed
 
@@ -59,6 +60,7 @@ class Realtime:
         clock_ns: Callable[[], int],
         log: Log,
         simulated_time: Callable[[], bool],
+        control: Control = LENGTH,
     ) -> None:
         """Keep what is needed; `start` starts.
 
@@ -69,8 +71,10 @@ class Realtime:
             log: told when stepping stops, when length stays away and comes back (both in the thread), and when time
                 went back.
             simulated_time: whether the time of stamps may go back.
+            control: what samples ask for.
         """
         self.batch = batch
+        self._control = control
         self.settings = settings
         self._emit = emit
         self._clock_ns = clock_ns
@@ -78,7 +82,7 @@ class Realtime:
         self._ticker = Ticker(self._ready, self._tick, self._done)
         self._names = [muscle.fibre.name for muscle in batch.muscles]
         scales = np.array([scale_of(muscle.fibre) for muscle in batch.muscles])
-        self._samples = Samples(self._names, scales, log, simulated_time)
+        self._samples = Samples(self._names, scales, log, simulated_time, control)
         self.take_calcium, self.take_length = self._samples.take_calcium, self._samples.take_length
         # The thread's own; arrays are replaced, never changed, since callbacks read them.
         self._rest = np.stack([muscle.rest() for muscle in batch.muscles])
@@ -86,7 +90,7 @@ class Realtime:
         self._states = self._rest
         self._use_live(np.zeros(len(batch), dtype=np.bool_))
         self._faults: dict[int, str] = {}
-        self._watchdog = Watchdog(self._names, log)
+        self._watchdog = Watchdog(self._names, log, control.topic)
         self._scale_out = self._samples.inputs.scale
         # Resets that were taken up, see `Inputs`.
         self._run = self._samples.inputs.run
@@ -141,7 +145,7 @@ class Realtime:
         live = live & (inputs.run == run)
         for i in range(len(self._names)):
             if i in faults or not live[i]:
-                why = no_state(faults.get(i, ""), "the first length and calcium")
+                why = no_state(faults.get(i, ""), f"the first {self._control.topic} and calcium")
                 raise UserError(f"{front(self._names, [i], begin='fibre ')}{why}")
         return tuple(
             Snapshot(
@@ -163,7 +167,7 @@ class Realtime:
         samples, now = self._samples, time.monotonic_ns()
         samples.taken = np.array([snapshot.account[:2] for snapshot in snapshots])
         samples.inputs = samples.inputs._replace(
-            change_l0=states[:, -3].copy(),
+            goal=self._control.still(states).copy(),
             velocity_l0_per_s=np.full(len(states), np.nan),
             calcium_um=np.array([snapshot.calcium[-1][1] for snapshot in snapshots]),
             arrival_ns=np.full(len(states), now, dtype=np.int64),
@@ -179,7 +183,7 @@ class Realtime:
         """How it goes, over all fibres."""
         inputs, live, faults = self._samples.inputs, self._live, self._faults
         missing: dict[str, list[int]] = {}
-        lacking = [("length", np.isnan(inputs.change_l0)), ("calcium", np.isnan(inputs.calcium_um))]
+        lacking = [(self._control.topic, np.isnan(inputs.goal)), ("calcium", np.isnan(inputs.calcium_um))]
         for i in np.flatnonzero(~live).tolist():
             if what := " and ".join(name for name, absent in lacking if absent[i]):
                 missing.setdefault(what, []).append(i)
@@ -223,16 +227,16 @@ class Realtime:
         stepping = self._any_live
         if not self._all_live:
             inputs = self._samples.inputs
-            due = ~self._live & ~np.isnan(inputs.change_l0) & ~np.isnan(inputs.calcium_um)
+            due = ~self._live & ~np.isnan(inputs.goal) & ~np.isnan(inputs.calcium_um)
             for i in np.flatnonzero(due).tolist():
                 if i not in self._faults:
-                    self._settle(i, float(inputs.change_l0[i]), float(inputs.calcium_um[i]))
+                    self._settle(i, float(inputs.goal[i]), float(inputs.calcium_um[i]))
         return stepping
 
-    def _settle(self, i: int, change_l0: float, calcium_um: float) -> None:
+    def _settle(self, i: int, goal: float, calcium_um: float) -> None:
         states, live = self._states.copy(), self._live.copy()
         try:
-            states[i], live[i] = self.batch.muscles[i].settle(change_l0, calcium_um), True
+            states[i], live[i] = self._control.settle(self.batch.muscles[i], goal, calcium_um), True
         except UserError as error:
             self._fail(i, error)
             return
@@ -247,27 +251,28 @@ class Realtime:
             live = live & (inputs.run == self._run)
             if not live.any():
                 return
-        change, calcium = inputs.change_l0, inputs.calcium_um
+        control, goal, calcium = self._control, inputs.goal, inputs.calcium_um
         if settings.extrapolate:
-            change = inputs.carried_on(deadline_ns, settings.extrapolation_limit_s)
+            goal = inputs.carried_on(deadline_ns, settings.extrapolation_limit_s)
         watchdog, begun_ns = self._watchdog, self._ticker.begun_ns
         overdue_s = watchdog.look(inputs, begun_ns, deadline_ns, settings.timeout_s, settings.on_timeout, live)
         if overdue_s is not None:
-            held = unfed(settings.on_timeout, overdue_s, settings.decay_s, inputs.change_l0, states[:, -3], calcium)
-            change, calcium = (np.where(watchdog.overdue, *p) for p in zip(held, (change, calcium), strict=True))
+            held = unfed(settings.on_timeout, overdue_s, settings.decay_s, inputs.goal, control.still(states), calcium)
+            goal, calcium = (np.where(watchdog.overdue, *p) for p in zip(held, (goal, calcium), strict=True))
         if not complete:
-            change, calcium = np.where(live, change, states[:, -3]), np.where(live, calcium, _REST_CALCIUM_UM)
+            goal, calcium = np.where(live, goal, control.still(states)), np.where(live, calcium, _REST_CALCIUM_UM)
         try:
-            self._states = step(self.batch, states, change, calcium, self._dt)
+            self._states = control.step_all(self.batch, states, goal, calcium, self._dt)
         except UserError:
-            self._one_by_one(states, change, calcium, live)
+            self._one_by_one(states, goal, calcium, live)
         self._ticks += 1
 
-    def _one_by_one(self, states: Floats, change: Floats, calcium: Floats, live: Flags) -> None:
+    def _one_by_one(self, states: Floats, goal: Floats, calcium: Floats, live: Flags) -> None:
         stepped = states.copy()
         for i in np.flatnonzero(live).tolist():
             try:
-                stepped[i] = self.batch.muscles[i].step(states[i], float(change[i]), float(calcium[i]), self._dt)
+                muscle, here = self.batch.muscles[i], (float(goal[i]), float(calcium[i]))
+                stepped[i] = self._control.step(muscle, states[i], *here, self._dt)
             except UserError as error:
                 stepped[i] = self._rest[i]
                 self._fail(i, error)
@@ -280,10 +285,11 @@ class Realtime:
             which = np.flatnonzero(self._live & (run == self._run))
             if not which.size:
                 return
-        table, scales = outputs(self.batch, None, self._states), self._scale_out
+        states = self._states
+        table, scales = outputs(self.batch, None, states), self._scale_out
         if which is not None:
-            table, scales = table[which], scales[which]
-        self._emit(self._clock_ns(), which, table, scales)
+            table, scales, states = table[which], scales[which], states[which]
+        self._emit(self._clock_ns(), which, table, scales, *self._control.answers(states))
 
     def _fail(self, i: int, error: UserError) -> None:
         self._violations += isinstance(error, StateViolation)

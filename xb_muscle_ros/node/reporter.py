@@ -20,8 +20,9 @@ from xb_muscle_ros.node.stepping import Stepping
 class Reporter:
     """Publishes ``/diagnostics``; rates are those since the last report."""
 
-    def __init__(self, node: Any, mode: str) -> None:
-        """Report for a node of rclpy in a mode."""
+    def __init__(self, node: Any, mode: str, driven_by: str = "length") -> None:
+        """Report for a node of rclpy in a mode, which is sent lengths or loads."""
+        self._driven_by = driven_by
         self._node = node
         self._mode = mode
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
@@ -47,7 +48,8 @@ class Reporter:
 
     def report(self, state: str, now_s: float, timeout_s: float) -> None:
         """Publish once; `now_s` is steady time, `timeout_s` the allowed age of the newest length sample, 0 for any."""
-        report = Report(self._node.get_fully_qualified_name(), self._mode, state, timeout_s=timeout_s, now_s=now_s)
+        name = self._node.get_fully_qualified_name()
+        report = Report(name, self._mode, state, timeout_s=timeout_s, now_s=now_s, driven_by=self._driven_by)
         totals: dict[str, float] = {"cpu_s": time.process_time()}
         if self._watched is not None:
             fibres, stepping, inlet, outlet, arrivals = self._watched

@@ -14,6 +14,7 @@ from xb_muscle_ros.models.fibre_file import Fibre
 
 # What any muscle may be asked for. Wider than muscle works in, narrower than a mistaken unit.
 LENGTH_CHANGE_L0 = (-0.5, 0.5)
+LOAD_F0 = (-1.0, 10.0)
 CALCIUM_UM = (0.0, 1e4)
 VELOCITY_L0_PER_S = (-1e3, 1e3)
 LONGEST_GAP_S = 3600.0
@@ -84,6 +85,17 @@ def impossible_length(position_m: float, reference_m: float) -> Refusal:
     remedy = f"send m, with 1 L0 = {reference_m:g} m (constants.reference_length_m)"
     what = f"length change (position {position_m:g} m)"
     return outside(length_change_l0(position_m, reference_m), LENGTH_CHANGE_L0, what, "L0", remedy)
+
+
+def load_f0(force_n: Any, f0_n: Any) -> Any:
+    """Load in F0; `force_n` is the force that the fibre is to bear, N."""
+    return force_n / f0_n
+
+
+def impossible_load(force_n: float, f0_n: float) -> Refusal:
+    """The refusal of a load (N) outside `LOAD_F0`."""
+    remedy = f"send N, with 1 F0 = {f0_n:g} N (constants.f0_n)"
+    return outside(load_f0(force_n, f0_n), LOAD_F0, f"load (effort {force_n:g} N)", "F0", remedy)
 
 
 def follows(stamp: int, last: Any) -> Any:

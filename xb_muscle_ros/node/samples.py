@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from xb_muscle_ros.node.control import LENGTH, Control
 from xb_muscle_ros.node.names import Indices, front
 from xb_muscle_ros.node.rules import (
     LENGTH_CHANGE_L0,
@@ -20,7 +21,6 @@ from xb_muscle_ros.node.rules import (
     Counts,
     Trouble,
     follows,
-    impossible_length,
     inside,
     length_change_l0,
     out_of_order,
@@ -41,13 +41,14 @@ class Inputs(NamedTuple):
     """The newest samples, shape (fibres,), never changed but replaced; NaN where there is none.
 
     Attributes:
-        change_l0, velocity_l0_per_s, calcium_um: velocity is NaN also where a sample came without.
-        arrival_ns, oldest_ns: steady time of the length samples, and of the oldest of them.
+        goal: length change, L0, or load, F0.
+        velocity_l0_per_s, calcium_um: velocity is NaN also where a sample came without.
+        arrival_ns, oldest_ns: steady time of the samples of length or load, and of the oldest of them.
         scale: in use, shape (fibres, 2): one L0 (m) and one F0 (N).
         run: counts the resets of each fibre; the same array as long as there is none.
     """
 
-    change_l0: Floats
+    goal: Floats
     velocity_l0_per_s: Floats
     calcium_um: Floats
     arrival_ns: Stamps
@@ -57,7 +58,7 @@ class Inputs(NamedTuple):
 
     def carried_on(self, time_ns: int, limit_s: float) -> Floats:
         """Length changes carried on by their velocities, where there are any and they lead to what is allowed."""
-        carried: Floats = _carried_on(self.change_l0, self.velocity_l0_per_s, self.arrival_ns, time_ns, limit_s)
+        carried: Floats = _carried_on(self.goal, self.velocity_l0_per_s, self.arrival_ns, time_ns, limit_s)
         return carried
 
 
@@ -120,10 +121,17 @@ class Samples:
         inputs: newest samples.
         next_scale: shape (fibres, 2), becomes the scale in use at a fibre's next reset.
         counts: what was odd about the input that was taken nevertheless.
-        taken: length and calcium samples of each fibre since its last reset, shape (fibres, 2).
+        taken: samples of length (or load) and calcium of each fibre since its last reset, shape (fibres, 2).
     """
 
-    def __init__(self, names: Sequence[str], scale: Floats, log: Log, simulated_time: Callable[[], bool]) -> None:
+    def __init__(
+        self,
+        names: Sequence[str],
+        scale: Floats,
+        log: Log,
+        simulated_time: Callable[[], bool],
+        control: Control = LENGTH,
+    ) -> None:
         """Know nothing yet.
 
         Args:
@@ -131,7 +139,9 @@ class Samples:
             scale: see `next_scale`.
             log: told when time went back.
             simulated_time: whether the time of stamps may go back.
+            control: what samples ask for.
         """
+        self._control = control
         count = len(names)
         none, zero = np.full(count, np.nan), np.zeros(count, dtype=np.int64)
         self.inputs = Inputs(none, none, none, zero, 0, scale.copy(), zero)
@@ -167,37 +177,41 @@ class Samples:
         self.inputs = self.inputs._replace(calcium_um=values)
         return troubles
 
-    def take_length(
-        self, stamp: int, fibres: Indices, position_m: Floats, velocity_m_per_s: Floats | None
-    ) -> list[Trouble]:
-        """Use lengths (m, m/s or None) of some fibres from the next tick on; see `take_calcium`."""
+    def take_length(self, stamp: int, fibres: Indices, given: Floats, velocity_m_per_s: Floats | None) -> list[Trouble]:
+        """Use lengths (m, m/s or None) or loads (N) of some fibres from the next tick on; see `take_calcium`."""
+        control = self._control
         old, last, back = self.inputs, self._length_stamps[fibres], None
-        reference = old.scale[fibres, 0]
+        unit = old.scale[fibres, control.unit]
         if stamp != 0 and self._simulated_time():
             back = went_back(stamp, last)
             last = np.where(back, NO_STAMP, last)
-            reference = np.where(back, self.next_scale[fibres, 0], reference)
-        velocity = _NO_VELOCITY if velocity_m_per_s is None else velocity_m_per_s
-        change, rate, good, all_good = _judged(stamp, position_m, velocity, reference, last)
+            unit = np.where(back, self.next_scale[fibres, control.unit], unit)
+        if control is LENGTH:
+            velocity = _NO_VELOCITY if velocity_m_per_s is None else velocity_m_per_s
+            goal, rate, good, all_good = _judged(stamp, given, velocity, unit, last)
+        else:
+            goal, rate = control.goal(given, unit), np.full(given.size, np.nan)
+            good = inside(goal, control.allowed) & (np.full(given.size, stamp == 0) | follows(stamp, last))
+            all_good = bool(good.all())
         troubles = []
         if not all_good:
             for k in np.flatnonzero(~good).tolist():
                 why = outside(float(rate[k]), VELOCITY_L0_PER_S, "velocity", "L0/s")
                 if stamp != 0 and not follows(stamp, int(last[k])):
-                    why = out_of_order(stamp, int(last[k]), "length")
-                elif not inside(change[k], LENGTH_CHANGE_L0):
-                    why = impossible_length(float(position_m[k]), float(reference[k]))
+                    why = out_of_order(stamp, int(last[k]), control.topic)
+                elif not inside(goal[k], control.allowed):
+                    why = control.impossible(float(given[k]), float(unit[k]))
                 troubles.append(Trouble(int(fibres[k]), why))
-            fibres, change, rate = fibres[good], change[good], rate[good]
+            fibres, goal, rate = fibres[good], goal[good], rate[good]
         if back is not None and (back & good).any():
             self._begin_again(stamp, fibres[back[good]])
             old = self.inputs
         if stamp != 0:
             self._length_stamps[fibres] = stamp
         self.taken[fibres, 0] += 1
-        changes, rates, arrivals = old.change_l0.copy(), old.velocity_l0_per_s.copy(), old.arrival_ns.copy()
-        oldest = _put(fibres, change, rate, time.monotonic_ns(), changes, rates, arrivals)
-        self.inputs = Inputs(changes, rates, old.calcium_um, arrivals, oldest, old.scale, old.run)
+        goals, rates, arrivals = old.goal.copy(), old.velocity_l0_per_s.copy(), old.arrival_ns.copy()
+        oldest = _put(fibres, goal, rate, time.monotonic_ns(), goals, rates, arrivals)
+        self.inputs = Inputs(goals, rates, old.calcium_um, arrivals, oldest, old.scale, old.run)
         return troubles
 
     def forget(self, which: Indices) -> None:
@@ -208,11 +222,11 @@ class Samples:
         self._length_stamps[which] = self._calcium_stamps[which] = NO_STAMP
         self.taken[which] = 0
         inputs = self.inputs
-        change, scale, run = inputs.change_l0.copy(), inputs.scale.copy(), inputs.run.copy()
-        change[which] = np.nan
+        goal, scale, run = inputs.goal.copy(), inputs.scale.copy(), inputs.run.copy()
+        goal[which] = np.nan
         scale[which] = self.next_scale[which]
         run[which] += 1
-        self.inputs = inputs._replace(change_l0=change, scale=scale, run=run)
+        self.inputs = inputs._replace(goal=goal, scale=scale, run=run)
 
     def _begin_again(self, stamp: int, back: Indices) -> None:
         last = int(self._length_stamps[back[0]])

@@ -18,8 +18,9 @@ from xb_muscle_ros.node.status import Status
 Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-# Stamp (ns), which fibres (None: all, in order), their outputs (fibre, name of `Outputs`) and scales (fibre, 2).
-Emit = Callable[[int, "Indices | None", Floats, Floats], None]
+# Stamp (ns), which fibres (None: all, in order), their outputs (fibre, name of `Outputs`), scales (fibre, 2), and what
+# `Control.answers` gives.
+Emit = Callable[..., None]
 
 
 class Stepping(Protocol):
@@ -32,10 +33,8 @@ class Stepping(Protocol):
     def take_calcium(self, stamp: int, fibres: Indices, calcium_um: Floats) -> list[Trouble]:
         """Take one stamp (ns), which fibres, their free calcium in µM; returns what was refused."""
 
-    def take_length(
-        self, stamp: int, fibres: Indices, position_m: Floats, velocity_m_per_s: Floats | None
-    ) -> list[Trouble]:
-        """Take one stamp (ns), which fibres, their lengths in m and velocities in m/s or None; see `take_calcium`."""
+    def take_length(self, stamp: int, fibres: Indices, given: Floats, velocity_m_per_s: Floats | None) -> list[Trouble]:
+        """Take one stamp (ns), which fibres, their lengths (m) or loads (N), and velocities (m/s) or None."""
 
     def status(self) -> Status:
         """How it goes."""

@@ -9,19 +9,17 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.node.calcium import KEPT, CalciumHistory
+from xb_muscle_ros.node.control import LENGTH, Control
 from xb_muscle_ros.node.names import Indices
 from xb_muscle_ros.node.plan import Numbers, Plan, States, let_pass, number, numbers
 from xb_muscle_ros.node.rules import (
-    LENGTH_CHANGE_L0,
     NO_STAMP,
     VELOCITY_L0_PER_S,
     Counts,
     Refusal,
     Scale,
     follows,
-    impossible_length,
     inside,
-    length_change_l0,
     out_of_order,
     outside,
     went_back,
@@ -42,9 +40,9 @@ class Run:
 
     scale: Floats
     states: States | None = None
-    # Stamp (ns) and length changes (L0) of the last length sample, and until when calcium was asked for, ns.
+    # Stamp (ns) and goals of the last sample of length or load, and until when calcium was asked for, ns.
     stamp: int = NO_STAMP
-    change: Numbers = 0.0
+    goal: Numbers = 0.0
     asked: int = NO_STAMP
     calcium: CalciumHistory = field(default_factory=CalciumHistory)
     # Stamp of the last calcium sample of this run, ns; older ones may be left from before time went back.
@@ -55,10 +53,6 @@ class Run:
     samples: int = 0
     calcium_samples: int = 0
     late: int = 0
-
-    def __post_init__(self) -> None:
-        # One L0, m.
-        self.reference = numbers(self.scale[:, 0])
 
     def account(self) -> Account:
         """What each fibre has taken."""
@@ -74,7 +68,7 @@ class Run:
             self,
             scale=self.scale[which],
             states=None if self.states is None else np.asarray(self.states)[which],
-            change=pick(self.change) if self.stamp != NO_STAMP else 0.0,
+            goal=pick(self.goal) if self.stamp != NO_STAMP else 0.0,
             calcium=self.calcium.each(pick),
             coming=self.coming.each(pick),
         )
@@ -101,6 +95,7 @@ class Timeline:
         counts: Counts,
         simulated_time: Callable[[], bool],
         on_back: Callable[[Sequence[int], int, Account], None],
+        control: Control = LENGTH,
     ) -> None:
         """Keep what is needed.
 
@@ -110,7 +105,9 @@ class Timeline:
             counts: of what was odd about the input that was taken nevertheless.
             simulated_time: whether time may go back.
             on_back: called where it did, with the fibres, the last stamp (ns) and what each had taken.
+            control: what samples ask for.
         """
+        self._control = control
         self.next_scale = scale
         self._counts = counts
         self._simulated_time = simulated_time
@@ -126,7 +123,9 @@ class Timeline:
         """Let fibres go, who from now on take other samples than those that stay; returns their timeline."""
         run, fibres, scale = self.run, self.places, self.next_scale
         kept, gone = np.flatnonzero(stay), np.flatnonzero(~stay)
-        other = Timeline(fibres[gone].tolist(), scale[gone], self._counts, self._simulated_time, self._on_back)
+        other = Timeline(
+            fibres[gone].tolist(), scale[gone], self._counts, self._simulated_time, self._on_back, self._control
+        )
         other.run = run.picked(gone)
         self.next_scale = scale[kept]
         self._become(fibres[kept].tolist(), run.picked(kept))
@@ -145,7 +144,7 @@ class Timeline:
         """
         run = self.run
         if run.fault or run.states is None:
-            raise no_state(run.fault, "the first length sample")
+            raise no_state(run.fault, f"the first {self._control.topic} sample")
         calcium = run.calcium.each(lambda values: number(values, place))
         scale = Scale(*run.scale[place].tolist())
         return Snapshot(run.states[place], scale, calcium.kept(), run.stamp, run.asked, run.account())
@@ -158,7 +157,7 @@ class Timeline:
         first = snapshots[0]
         run = self.run = Run(np.array([snapshot.scale for snapshot in snapshots]))
         states = run.states = np.stack([snapshot.state for snapshot in snapshots])
-        run.change = numbers(states[:, -3].copy())
+        run.goal = numbers(states[:, -3].copy())
         assert first.stamp is not None
         assert first.asked is not None
         run.stamp, run.asked = first.stamp, first.asked
@@ -191,8 +190,8 @@ class Timeline:
             run.late += 1
             self._counts["late calcium"] += len(self.fibres)
 
-    def plan(self, stamp: int, position_m: Numbers) -> Plan:
-        """What a length sample (stamp in ns, m) asks for; follow with `commit` or `failed`.
+    def plan(self, stamp: int, given: Numbers) -> Plan:
+        """What a sample (stamp in ns, m or N) asks for; follow with `commit` or `failed`.
 
         Raises:
             Refusal: the sample cannot be integrated, by none of the fibres or by the only one.
@@ -201,14 +200,15 @@ class Timeline:
         back = went_back(stamp, self.run.stamp) and self._simulated_time()
         if self.run.fault and not back:
             raise Refusal("stopped", "integration failed before; call ~/reset to start again")
-        reference = numbers(self.next_scale[:, 0]) if back else self.run.reference
-        change = length_change_l0(position_m, reference)
-        let_pass(inside(change, LENGTH_CHANGE_L0), impossible_length, position_m, reference)
+        control = self._control
+        unit = numbers((self.next_scale if back else self.run.scale)[:, control.unit])
+        goal = control.goal(given, unit)
+        let_pass(inside(goal, control.allowed), control.impossible, given, unit)
         if back:
             self._begin_again(stamp)
         run = self.run
         last = run.stamp
-        stamp = _after(stamp, last, "length")
+        stamp = _after(stamp, last, control.topic)
         asked = stamp if last == NO_STAMP else last
         calcium = run.calcium.at(asked)
         if calcium is None:
@@ -217,16 +217,17 @@ class Timeline:
                 remedy = f"the newest {KEPT} are kept and all are later; publish less of it ahead of length"
             raise Refusal("waiting for calcium", f"none with a stamp up to {asked * 1e-9:.9f} s; {remedy}")
         if last == NO_STAMP:
-            return Plan(stamp, asked, change, calcium, None, 0.0)
+            return Plan(stamp, asked, goal, calcium, None, 0.0)
         dt_s = (stamp - last) / 1e9
-        velocity = (change - run.change) / dt_s
-        let_pass(inside(velocity, VELOCITY_L0_PER_S), _too_fast, velocity)
-        return Plan(stamp, asked, change, calcium, run.states, dt_s)
+        if control is LENGTH:
+            velocity = (goal - run.goal) / dt_s
+            let_pass(inside(velocity, VELOCITY_L0_PER_S), _too_fast, velocity)
+        return Plan(stamp, asked, goal, calcium, run.states, dt_s)
 
     def commit(self, plan: Plan, states: States) -> None:
         """Take a plan's result up, shape (fibres, n)."""
         run = self.run
-        run.states, run.stamp, run.change, run.asked = states, plan.stamp, plan.change_l0, plan.asked
+        run.states, run.stamp, run.goal, run.asked = states, plan.stamp, plan.goal, plan.asked
         run.samples += 1
 
     def failed(self, plan: Plan, error: UserError) -> UserError:

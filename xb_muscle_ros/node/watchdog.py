@@ -1,4 +1,4 @@
-"""What becomes of fibres whose length stays away."""
+"""What becomes of fibres whose length, or load, stays away."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ class Watchdog:
         timeouts: how often one became overdue since the last `forget` of all.
     """
 
-    def __init__(self, names: Sequence[str], log: Log) -> None:
+    def __init__(self, names: Sequence[str], log: Log, topic: str = "length") -> None:
+        """Watch fibres of these names; `topic` is what they are to be sent."""
+        self._topic = topic
         self._names = names
         self._log = log
         self._arrival_ns = np.zeros(len(names), dtype=np.int64)
@@ -68,34 +70,34 @@ class Watchdog:
         if begun.any():
             which = np.flatnonzero(begun).tolist()
             self.timeouts += len(which)
-            told = f"no length for {age_s[which[0]]:.3f} s, timeout_s is {timeout_s:g} s: {on_timeout}"
+            told = f"no {self._topic} for {age_s[which[0]]:.3f} s, timeout_s is {timeout_s:g} s: {on_timeout}"
             self._log.error(front(self._names, which) + told)
         if over.any():
             which = np.flatnonzero(over).tolist()
             away = away_s[which[0]]
             # With the old sample still in place it is the parameter that has changed.
-            end = f"length is back after {away:.3f} s" if away else f"timeout_s is {timeout_s:g} s now"
+            end = f"{self._topic} is back after {away:.3f} s" if away else f"timeout_s is {timeout_s:g} s now"
             self._log.info(f"{front(self._names, which)}{end}: {on_timeout} ends")
 
 
 def unfed(
-    on_timeout: str, overdue_s: Floats, decay_s: float, sample_l0: Floats, model_l0: Floats, calcium_um: Floats
+    on_timeout: str, overdue_s: Floats, decay_s: float, sample: Floats, still: Floats, calcium_um: Floats
 ) -> tuple[Floats, Floats]:
-    """Length changes (L0) and calcium (µM) to step fibres with whose length is overdue.
+    """Goals (length change, L0, or load, F0) and calcium (µM) to step fibres with whose sample is overdue.
 
-    ``hold``: length of the last sample. ``isometric``: the length that the fibre has, so that velocity is zero from the
-    first step on. ``decay``: as isometric, with calcium falling as exp(-overdue_s / decay_s).
+    ``hold``: length or load of the last sample. ``isometric``: the length that the fibre has, so that velocity is zero
+    from the first step on. ``decay``: as isometric, with calcium falling as exp(-overdue_s / decay_s).
 
     Args:
         on_timeout: one of the three.
         overdue_s: for how long, s.
         decay_s: time constant of calcium, s.
-        sample_l0: length changes of the last samples, L0.
-        model_l0: length changes that the fibres have, L0.
+        sample: goals of the last samples.
+        still: goals at which the fibres keep their lengths.
         calcium_um: newest calcium, µM.
     """
     if on_timeout == HOLD:
-        return sample_l0, calcium_um
+        return sample, calcium_um
     if on_timeout == DECAY:
         calcium_um = calcium_um * np.exp(-overdue_s / decay_s)
-    return model_l0, calcium_um
+    return still, calcium_um

@@ -1,0 +1,65 @@
+"""A node under force control on the other side of DDS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from xb_muscle_ros.models.clamping import clamp_run
+from xb_muscle_ros.models.fibre_file import load_fibre
+from xb_muscle_ros.models.muscle import Muscle
+
+FIBRE = "18Dec2017a"
+PATIENCE_S = 30.0
+
+
+def test_loads_in_lengths_out(new_domain: Callable[[], int]) -> None:
+    """Lengths are those without ROS, to the bit, in metres; force is the load."""
+    from node_driver import Driver
+    from sensor_msgs.msg import JointState
+
+    from xb_muscle_ros.node.client.process import NodeProcess
+
+    domain = new_domain()
+    fibre = load_fibre(FIBRE)
+    muscle = Muscle(fibre)
+    isometric = muscle.outputs(muscle.settle(0.0, 5.0)).force_f0
+    loads = np.concatenate([np.full(5, isometric), isometric * np.linspace(0.9, 0.3, 40)])
+    with NodeProcess(domain, {"fiber_file": FIBRE, "mode": "lockstep", "control": "force"}) as process:
+        driver = Driver(process, domain, "")
+        lengths: list[Any] = []
+        driver.link.node.create_subscription(JointState, "muscle/length", lengths.append, 100)
+        driver.ready()
+        node = driver.link.node
+        assert driver.link.wait_for(lambda: bool(node.count_publishers("muscle/length")), PATIENCE_S), process.log()
+        # Both sides know each other once an answer has come.
+        end = 0
+        while not lengths and end < 30:
+            driver.link.reset()
+            driver.send("calcium", 0.0, 5.0)
+            driver.send("load", 0.0, effort=[0.5 * fibre.f0_n])
+            driver.link.wait_for(lambda: bool(lengths), 1.0)
+            end += 1
+        driver.link.reset()
+        driver.link.wait_for(lambda: False, 0.3)
+        lengths.clear()
+        driver.forces.clear()
+        driver.send("calcium", 0.0, 5.0)
+        for k, load in enumerate(loads):
+            driver.send("load", 1.0 + 1e-3 * k, effort=[load * fibre.f0_n])
+        full = loads.size
+        assert driver.link.wait_for(lambda: len(lengths) >= full and len(driver.forces) >= full, PATIENCE_S), (
+            process.log()
+        )
+        report = driver.report(lambda values: True)
+        driver.link.close()
+    stamps = np.array([m.header.stamp.sec * 10**9 + m.header.stamp.nanosec for m in lengths])
+    dt_s = np.diff(stamps) / 1e9
+    borne = loads * fibre.f0_n / fibre.f0_n
+    states = clamp_run(muscle, muscle.settle(0.0, 5.0), dt_s, borne, np.full(full, 5.0))
+    assert [m.position[0] for m in lengths] == [fibre.reference_length_m * (1.0 + c) for c in states[:, -3]]
+    assert [m.effort[0] / fibre.f0_n for m in driver.forces[1:]] == pytest.approx(loads[1:], abs=1e-6)
+    assert report["message"] == "stepping"
