@@ -63,3 +63,57 @@ def test_loads_in_lengths_out(new_domain: Callable[[], int]) -> None:
     assert [m.position[0] for m in lengths] == [fibre.reference_length_m * (1.0 + c) for c in states[:, -3]]
     assert [m.effort[0] / fibre.f0_n for m in driver.forces[1:]] == pytest.approx(loads[1:], abs=1e-6)
     assert report["message"] == "stepping"
+
+
+@pytest.mark.parametrize(
+    ("protocol", "control", "options"),
+    [
+        ("force-clamp", "force", {"load": [0.2, 0.6], "rate": 1000.0, "hold": 0.1}),
+        ("twitch", "length", {"rate": 1000.0, "duration": 0.3}),
+        ("ramp-hold", "length", {"pca": 6.1, "hold": 0.1}),
+    ],
+)
+def test_a_protocol_through_a_node(
+    new_domain: Callable[[], int], monkeypatch: pytest.MonkeyPatch, protocol: str, control: str, options: dict[str, Any]
+) -> None:
+    """The same bits as sample by sample without ROS, and the same table."""
+    import xb_muscle_ros as xb
+    from xb_muscle_ros.node.client.process import NodeProcess
+
+    domain = new_domain()
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    told: list[str] = []
+    with NodeProcess(domain, {"fiber_file": FIBRE, "mode": "lockstep", "control": control}):
+        live = xb.run_protocol(protocol, FIBRE, live=True, tell=told.append, **options)
+    if control == "force":
+        (offline,) = xb.run_protocol(protocol, FIBRE, tell=told.append, **options).results
+        (found,) = live.results
+        assert found.column("shortening_l0_per_s") == pytest.approx(offline.column("shortening_l0_per_s"), rel=1e-6)
+        assert np.all(found.column("held_within_f0") < 1e-6)
+        return
+    again = xb.analyse_protocol(
+        protocol, [_measured(trial) for trial in live.trials], model="3state_coop", tell=told.append
+    )
+    for one, other in zip(live.results[0].runs, again.results[1].runs, strict=True):
+        assert one.force_f0.tolist() == other.force_f0.tolist()
+
+
+def test_the_other_control_is_one_line(new_domain: Callable[[], int], monkeypatch: pytest.MonkeyPatch) -> None:
+    import xb_muscle_ros as xb
+    from xb_muscle_ros.node.client.process import NodeProcess
+
+    domain = new_domain()
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    with (
+        NodeProcess(domain, {"fiber_file": FIBRE, "mode": "lockstep"}),
+        pytest.raises(xb.UserError, match=r"control.*force"),
+    ):
+        xb.run_protocol("force-clamp", FIBRE, live=True, load=0.5, tell=lambda line: None)
+    with pytest.raises(xb.UserError, match="--live leaves settling to the node"):
+        xb.run_protocol("force-clamp", FIBRE, live=True, settle=1.0)
+
+
+def _measured(trial: Any) -> Any:
+    from dataclasses import replace
+
+    return replace(trial, force_is_measured=True)

@@ -170,8 +170,8 @@ def test_a_second_publisher_is_refused(start: Callable[..., Any]) -> None:
     from xb_muscle_ros.node.client.player import play_live
 
     driver = start(mode="lockstep")
-    trials = [wavy_trial(f"trial {k}", 300) for k in range(20)]
-    # The player may meet the node before it hears of the other publisher, but not for long.
+    trials = [wavy_trial(f"trial {k}", 300) for k in range(150)]
+    # The player may meet the node before it hears of the other publisher, by some seconds at most.
     with pytest.raises(UserError, match="more publishers"):
         play_live(trials, namespace=driver.namespace, domain_id=driver.domain)
 

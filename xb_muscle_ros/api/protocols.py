@@ -17,6 +17,7 @@ from xb_muscle_ros.api.inputs import (
     picked,
     read_trials,
 )
+from xb_muscle_ros.api.protocol_runs import answers
 from xb_muscle_ros.api.simulating import bag_path
 from xb_muscle_ros.api.tables import dataframe, drawn
 from xb_muscle_ros.api.telling import Lines, Tell
@@ -139,6 +140,7 @@ def run_protocol(
     as_measured: bool = False,
     tell: Tell | None = None,
     each: Callable[[Run], None] | None = None,
+    live: bool = False,
     **options: Numbers,
 ) -> ProtocolResult:
     """Run a protocol of a muscle laboratory through a model, and read off what a physiologist would.
@@ -153,6 +155,8 @@ def run_protocol(
         as_measured: the force counts as measured.
         tell: hears each line on what is missing or was taken for granted; None: a `DataWarning` each.
         each: hears each trial as soon as it is made.
+        live: play the trials through a running ``muscle_node`` in lockstep, sample by sample; for ``force-clamp`` with
+            ``control`` set to ``force``.
         options: of the protocol, a number or several, for example ``pca=[4.5, 6.1]``.
 
     Returns:
@@ -178,7 +182,8 @@ def run_protocol(
     lines = Lines(tell)
     whose = fibre_of(fibre, model, method, set, lines)
     runs = []
-    for run in running.answers(chosen, whose, chosen.plan(whose.name, settings), settle, as_measured):
+    planned = chosen.plan(whose.name, settings)
+    for run in answers(chosen, whose, planned, settle, as_measured, live):
         runs.append(run)
         if each is not None:
             each(run)

@@ -30,6 +30,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--as-measured", action="store_true",
         help="also write the force as measured force, to replay the bag like a recording",
     )  # fmt: skip
+    parser.add_argument(
+        "--live", action="store_true",
+        help="play the trials through a running muscle_node (mode lockstep; for force-clamp control:=force)",
+    )  # fmt: skip
     parser.add_argument("--prefix", default="simulated", help="begins the names of the bags (default simulated)")
     common.add_out(parser, "folder for the bags", "bags")
     group = parser.add_argument_group("numbers of the protocols")
@@ -42,10 +46,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Simulate and write, one trial after the other."""
+    from xb_muscle_ros.api.protocol_runs import answers
     from xb_muscle_ros.api.protocols import ProtocolResult, check_room
     from xb_muscle_ros.api.simulating import bag_path
     from xb_muscle_ros.progress import Progress
-    from xb_muscle_ros.protocols import report, running
+    from xb_muscle_ros.protocols import report
     from xb_muscle_ros.protocols.base import settings_of
     from xb_muscle_ros.protocols.registry import all_options, protocol_of
     from xb_muscle_ros.simulation.offline import one_for_all, pushing
@@ -65,8 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
     check_room(arguments.out, protocol if told else None, paths, arguments.overwrite)
     runs, pushed = [], []
     with Progress(len(planned), "simulate") as progress:
-        answers = running.answers(protocol, fibre, planned, arguments.settle, arguments.as_measured)
-        for path, made in zip(paths, answers, strict=True):
+        asked = (protocol, fibre, planned, arguments.settle, arguments.as_measured, arguments.live)
+        for path, made in zip(paths, answers(*asked), strict=True):
             assert made.simulated is not None  # a model's answer
             write_trial(path, made.trial, made.simulated)
             if line := pushing(made.trial, made.simulated, fibre.model):

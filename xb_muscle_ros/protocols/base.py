@@ -95,11 +95,13 @@ class Planned:
         trial: length, calcium, phases and facts, among them the protocol and its settings; without force.
         corner_s, corner_l0: shape (m,), s and L0; where length is straight between few corners, so that a model goes
             from one to the next by variable steps. Empty where it goes from sample to sample.
+        load: shape (n,), over the isometric force at the first sample, where length answers to it; else empty.
     """
 
     trial: Trial
     corner_s: Array = field(default_factory=lambda: np.empty(0))
     corner_l0: Array = field(default_factory=lambda: np.empty(0))
+    load: Array = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,8 @@ class ForceClamps(Protocol):
             told = {"pca": pca, "load": load, "begin_s": begin, "window_s": window}
             facts = facts_of(self.name, fibre, f"clamp_load{1e3 * load:g}_pca{10.0 * pca:g}", told)
             made = planned_between(facts, [("isometric", lead, 0.0), (CLAMP, hold, 0.0)], pca, rate)
-            planned.append(Planned(made.trial))
+            clamped = made.trial.time_s > made.trial.phases_by_name()[CLAMP].start_s + 5e-10
+            planned.append(Planned(made.trial, load=np.where(clamped, load, 1.0)))
         return planned
 
     def answer(self, muscle: Muscle, planned: Planned, settle_s: float | None = None) -> Run:

@@ -15,7 +15,7 @@ from rclpy.duration import Duration
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.node.client.link import Link
-from xb_muscle_ros.node.client.wires import Sender, reliable
+from xb_muscle_ros.node.client.wires import LoadSender, Sender, reliable
 from xb_muscle_ros.node.configuration import flat
 from xb_muscle_ros.node.joint_state import Joints
 from xb_muscle_ros.node.traffic import subscribe
@@ -61,20 +61,64 @@ def play_live(
     if not trials:
         return []
     with Link("muscle_player", namespace, domain_id) as link:
-        name = trials[0].facts.fibre
-        model = f" -p model:={fibre.model}" if fibre is not None else ""
-        given = str(fibre.path) if fibre is not None and fibre.path is not None else name
-        command = f"muscle_node --ros-args -p fiber_file:={given}{model} -p mode:=lockstep"
-        player = _Player(link, name, timeout_s)
-        link.find(find_s, command)
-        _check(link, trials, fibre, command)
-        player.meet(find_s)
+        player = _met(link, trials, fibre, (timeout_s, find_s), "length")
         return [player.play(trial) for trial in trials]
 
 
-def _check(link: Link, trials: Sequence[Trial], fibre: Fibre | None, command: str) -> None:
+def play_loads(
+    trials: Sequence[Trial],
+    shares: Sequence[npt.NDArray[np.float64]],
+    fibre: Fibre | None = None,
+    timeout_s: float = 10.0,
+    find_s: float = _FIND_S,
+    namespace: str = "",
+    domain_id: int | None = None,
+) -> list[tuple[Simulated, npt.NDArray[np.float64]]]:
+    """Play trials of loads through the muscle node of a namespace, which is in lockstep and under force control.
+
+    Args:
+        trials: see `play_live`; their lengths are not sent.
+        shares: of each trial the load at every sample, shape (n,), over the isometric force with which the node
+            answers the first sample.
+        fibre, timeout_s, find_s, namespace, domain_id: see `play_live`.
+
+    Returns:
+        One result per trial, in order, and the lengths (m) with which the node answered, shape (n,).
+
+    Raises:
+        UserError: see `play_live`.
+    """
+    if not trials:
+        return []
+    with Link("muscle_player", namespace, domain_id) as link:
+        player = _met(link, trials, fibre, (timeout_s, find_s), "load")
+        found = []
+        for trial, share in zip(trials, shares, strict=True):
+            player.shares = share
+            found.append((player.play(trial), player.length_m))
+        return found
+
+
+def _met(
+    link: Link, trials: Sequence[Trial], fibre: Fibre | None, patience_s: tuple[float, float], topic: str
+) -> _Player:
+    """A player and the node that it needs, which know each other."""
+    timeout_s, find_s = patience_s
+    name = trials[0].facts.fibre
+    model = f" -p model:={fibre.model}" if fibre is not None else ""
+    given = str(fibre.path) if fibre is not None and fibre.path is not None else name
+    control = " -p control:=force" if topic == "load" else ""
+    command = f"muscle_node --ros-args -p fiber_file:={given}{model} -p mode:=lockstep{control}"
+    player = _Player(link, name, timeout_s, topic)
+    link.find(find_s, command)
+    _check(link, trials, fibre, command, "force" if topic == "load" else "length")
+    player.meet(find_s)
+    return player
+
+
+def _check(link: Link, trials: Sequence[Trial], fibre: Fibre | None, command: str, control: str) -> None:
     link.check_active()
-    wanted: dict[str, object] = {"mode": "lockstep"}
+    wanted: dict[str, object] = {"mode": "lockstep", "control": control}
     if fibre is not None:
         wanted |= {n: v for n, v in flat(fibre).items() if not n.startswith(("source", "constants."))}
     fibre_there = link.parameters(["fibre"])["fibre"]
@@ -88,17 +132,26 @@ def _check(link: Link, trials: Sequence[Trial], fibre: Fibre | None, command: st
 
 
 class _Player:
-    """Topics on one side, arrays on the other."""
+    """Topics on one side, arrays on the other.
 
-    def __init__(self, link: Link, fibre: str, timeout_s: float) -> None:
+    Attributes:
+        shares: loads of the trial that is played next, over its isometric force, shape (n,); where loads are sent.
+        length_m: lengths that were answered to the last trial, shape (n,), m; where loads are sent.
+    """
+
+    def __init__(self, link: Link, fibre: str, timeout_s: float, topic: str = "length") -> None:
         self._link = link
         self._timeout_s = timeout_s
         node = link.node
-        self._length, self._calcium = (Sender(node, f"muscle/{topic}", [fibre]) for topic in ("length", "calcium"))
+        self.shares, self._loads = np.empty(0), topic == "load"
+        self._calcium = Sender(node, "muscle/calcium", [fibre])
+        self._driver = (LoadSender if self._loads else Sender)(node, f"muscle/{topic}", [fibre])
         self._inlets = [
             subscribe(node, "muscle/force", self._on_force, reliable()),
             subscribe(node, "muscle/moments", self._on_moments, reliable()),
         ]
+        if self._loads:
+            self._inlets.append(subscribe(node, "muscle/length", self._on_length, reliable()))
         self._met = False
         self._begin({}, 0)
 
@@ -108,12 +161,12 @@ class _Player:
         Raises:
             UserError: they do not in time.
         """
-        ends = (self._length.publisher, self._calcium.publisher)
+        ends = (self._driver.publisher, self._calcium.publisher)
         if not self._link.wait_for(lambda: all(end.get_subscription_count() for end in ends), timeout_s):
             raise UserError(f"node {self._link.peer} does not listen to {ends[0].topic_name}; check its remappings")
 
     def _check_alone(self) -> None:
-        topics = [end.publisher.topic_name for end in (self._length, self._calcium)]
+        topics = [end.publisher.topic_name for end in (self._driver, self._calcium)]
 
         def others() -> int:
             return sum(self._link.node.count_publishers(topic) - 1 for topic in topics)
@@ -160,11 +213,13 @@ class _Player:
             # Nothing of an earlier attempt may arrive in the middle of this one.
             self._wait_for_calcium(trial)
         self._start(trial, plan, wait)
+        # A load is a share of the force with which the first sample was answered.
+        values = self._force[0, 0] * self.shares if self._loads else trial.length_m
         for first in range(1, stamps.size, _WINDOW):
             window = range(first, min(first + _WINDOW, stamps.size))
             self._send_calcium(trial, plan, sorted({int(i) for i in plan.held[first : window.stop]}), wait)
             for k in window:
-                self._length.send(int(stamps[k]), trial.length_m[k])
+                self._driver.send(int(stamps[k]), values[k])
             self._await(window, trial, plan)
 
     def _start(self, trial: Trial, plan: _Plan, wait: bool) -> None:
@@ -173,7 +228,7 @@ class _Player:
         def send() -> None:
             self._sent_calcium, self._newest_calcium = 0, -1
             self._send_calcium(trial, plan, [int(plan.held[0])], wait)
-            self._length.send(int(plan.stamps[0]), trial.length_m[0])
+            self._driver.send(int(plan.stamps[0]), 0.0 if self._loads else trial.length_m[0])
 
         patience = self._timeout_s if self._met else _HANDSHAKE_S
         self._met = self._link.begin(send, lambda: bool(self._missing[0] == 0), self._timeout_s, patience)
@@ -184,8 +239,9 @@ class _Player:
         self._index = index
         self._force = np.full((samples, 3), np.nan)
         self._moments = np.full((samples, len(MOMENTS)), np.nan)
-        # Per sample: 1 for the force, 2 for the moments still to come.
-        self._missing = np.full(samples, 3, dtype=np.int64)
+        self.length_m = np.full(samples, np.nan)
+        # Per sample: 1 for the force, 2 for the moments, 4 for the length still to come.
+        self._missing = np.full(samples, 7 if self._loads else 3, dtype=np.int64)
         # How many were sent since the last reset, and the index of the newest of them.
         self._sent_calcium, self._newest_calcium = 0, -1
 
@@ -217,7 +273,8 @@ class _Player:
             before = now
 
     def _give_up(self, k: int, trial: Trial, plan: _Plan) -> None:
-        what = "force" if self._missing[k] & 1 else "moments"
+        missing = int(self._missing[k])
+        what = "force" if missing & 1 else "moments" if missing & 2 else "length"
         raise UserError(
             f"trial {trial.facts.trial}: node {self._link.peer} sent no {what} for the sample stamped "
             f"{plan.stamps[k] * 1e-9:.9f} s within {self._timeout_s:g} s; its log says whether it refused the sample"
@@ -234,6 +291,12 @@ class _Player:
         if k is not None:
             self._moments[k] = message.position
             self._missing[k] &= ~2
+
+    def _on_length(self, message: Joints) -> None:
+        k = self._index.get(message.stamp_ns)
+        if k is not None:
+            self.length_m[k] = message.position[0]
+            self._missing[k] &= ~4
 
 
 class _Plan(NamedTuple):

@@ -21,7 +21,7 @@ def reliable() -> QoSProfile:
 
 
 class Sender:
-    """A publisher of ``muscle/length`` or ``muscle/calcium``, whose message is filled in place.
+    """A publisher of ``muscle/length``, ``muscle/load`` or ``muscle/calcium``, whose message is filled in place.
 
     Attributes:
         publisher: of rclpy.
@@ -43,3 +43,22 @@ class Sender:
             outlet.velocity[:] = velocity
         outlet.position[:] = values
         outlet.publish(stamp_ns)
+
+
+class LoadSender:
+    """A publisher of ``muscle/load``: the same, with values in effort.
+
+    Attributes:
+        publisher: of rclpy.
+    """
+
+    def __init__(self, node: Any, topic: str, fibres: Sequence[str]) -> None:
+        """Publish on a topic, see `Sender`."""
+        self.publisher = node.create_publisher(JointState, topic, reliable())
+        self._outlet = Outlet(self.publisher, fibres, max(len(fibres), 1), FIELDS, as_bytes())
+        self._outlet.position[:] = self._outlet.velocity[:] = 0.0
+
+    def send(self, stamp_ns: int, values: Floats | float) -> None:
+        """Publish forces that the fibres are to bear (N), shape (fibres,), or one for all."""
+        self._outlet.effort[:] = values
+        self._outlet.publish(stamp_ns)
