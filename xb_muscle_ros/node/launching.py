@@ -19,6 +19,7 @@ OF_MUSCLES = {
     "fiber_file": str,
     "model": str,
     "mode": str,
+    "control": str,
     "rate_hz": float,
     "timeout_s": float,
     "on_timeout": str,
@@ -65,6 +66,7 @@ def muscle_description(
     arguments = [
         *own,
         argument("mode", "realtime", mode, ["realtime", "lockstep"]),
+        argument("control", "length", "length: length in, force out; force: load in, length out", ["length", "force"]),
         argument("rate_hz", rate_hz, "steps per second in realtime mode"),
         argument("timeout_s", "0.0", "age at which a length sample is too old; 0: no age is"),
         argument("on_timeout", "isometric", on_timeout, ["hold", "isometric", "decay"]),
