@@ -94,6 +94,8 @@ def test_the_model_that_made_a_recording_repeats_it(made: xb.ProtocolResult) -> 
         ("force-pca", {"pca": 2.0}, "--pca is 2; allowed is 3 to 12"),
         ("force-pca", {"rate": [100.0, 200.0]}, "--rate has 2 numbers; protocol force-pca takes one"),
         ("ramp-hold", {"amplitude": 0.0}, "--amplitude is 0 L0; a ramp needs a change of length"),
+        ("force-velocity", {"velocity": 0.0}, "--velocity is 0 L0/s; a ramp needs a velocity"),
+        ("step", {"size": 0.0}, "--size is 0 L0; a step needs a change of length"),
         ("force-pca", {"duration": 3000.0, "rate": 1e5}, "take a lower rate"),
     ],
 )

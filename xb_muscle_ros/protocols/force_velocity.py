@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.protocols import force_velocity_curve as curve
 from xb_muscle_ros.protocols.base import Cell, Column, Found, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
@@ -50,12 +51,18 @@ class ConstantVelocities(Protocol):
     source = "e.g. Edman 1988"
 
     def plan(self, fibre: str, settings: Settings) -> list[Planned]:
-        """One trial for each pCa and velocity, from one side of rest length to the other."""
+        """One trial for each pCa and velocity, from one side of rest length to the other.
+
+        Raises:
+            UserError: a velocity is zero.
+        """
         amplitude, lead, rate = (settings[k][0] for k in ("amplitude", "lead", "rate"))
         planned = []
         for pca, speed in itertools.product(settings["pca"], settings["velocity"]):
             if speed == 0.0:
-                continue  # the isometric force is that before each ramp
+                raise UserError(
+                    "--velocity is 0 L0/s; a ramp needs a velocity, and the isometric force is that before it"
+                )
             rise = amplitude if speed > 0.0 else -amplitude
             name = f"velocity_{'plus' if speed > 0.0 else 'minus'}{abs(speed):g}_pca{10.0 * pca:g}"
             told = {"pca": pca, "velocity_l0_per_s": speed, "amplitude_l0": amplitude}

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.protocols.base import Cell, Column, Curve, Found, Number, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.figures import legend, lettered, looks
 from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
@@ -62,10 +63,16 @@ class QuickSteps(Protocol):
     source = "Huxley and Simmons 1971; Ford, Huxley and Simmons 1977"
 
     def plan(self, fibre: str, settings: Settings) -> list[Planned]:
-        """One trial for each pCa and size of step."""
+        """One trial for each pCa and size of step.
+
+        Raises:
+            UserError: a size is zero.
+        """
         step_s, window, lead, rate = (settings[k][0] for k in ("step-time", "window", "lead", "rate"))
         planned = []
         for pca, size in itertools.product(settings["pca"], settings["size"]):
+            if size == 0.0:
+                raise UserError("--size is 0 L0; a step needs a change of length")
             name = f"step_{'minus' if size < 0.0 else 'plus'}{abs(size) * 1e5:g}_pca{10.0 * pca:g}"
             told = {"pca": pca, "size_l0": size, "step_s": step_s, "window_s": window}
             moved = "release" if size < 0.0 else "stretch"
