@@ -86,6 +86,18 @@ def test_the_model_that_made_a_recording_repeats_it(made: xb.ProtocolResult) -> 
         assert np.median(apart) < 1e-3, one.trial.facts.trial
 
 
+@pytest.mark.parametrize("name", list(PROTOCOLS))
+def test_recordings_of_something_else_are_notes_and_a_figure(name: str, tmp_path: Path) -> None:
+    """Two trials that are another protocol's, or none's, with nothing to read off for most."""
+    made = xb.simulate(FIBRE, recovery=0.1, pca=[4.5, 9.0], as_measured=True)
+    t = np.arange(0.0, 0.3, 1e-3)
+    still = xb.simulate(FIBRE, time=t, length=0.0 * t, calcium=0.0, name="still", as_measured=True)
+    found = xb.analyse_protocol(name, [*made.trials, *still.trials], tell=lambda line: None)
+    assert found.results[0].notes or found.results[0].rows
+    for path in found.save(tmp_path):
+        assert path.exists()
+
+
 @pytest.mark.parametrize(
     ("protocol", "options", "said"),
     [

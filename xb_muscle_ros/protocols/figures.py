@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from xb_muscle_ros.models.titles import title_of
 from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, THIRD
 from xb_muscle_ros.protocols.base import MEASURED, Found
@@ -58,6 +60,16 @@ def legend(axis: Any) -> None:
     once = dict(zip(names, handles, strict=True))
     if once:
         axis.legend(once.values(), once.keys(), frameon=False, handlelength=1.8)
+
+
+def logarithmic(axis: Any, x: bool = True, y: bool = False) -> None:
+    """Logarithmic scales, where the lines of an axis have a positive number to show on them."""
+    # A line across an axis is none that shows data.
+    data = [line for line in axis.get_lines() if all(line.get_transform().contains_branch_seperately(axis.transData))]
+    drawn = [points[np.all(np.isfinite(points), axis=1)] for points in (line.get_xydata() for line in data)]
+    for asked, column, scale in ((x, 0, axis.set_xscale), (y, 1, axis.set_yscale)):
+        if asked and any(np.any(points[:, column] > 0.0) for points in drawn):
+            scale("log")
 
 
 def lettered(axes: Sequence[Any]) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.protocols.base import Cell, Column, Curve, Found, Number, Option, Planned, Protocol, Run, Settings
-from xb_muscle_ros.protocols.figures import legend, lettered, looks, plainly
+from xb_muscle_ros.protocols.figures import legend, lettered, logarithmic, looks, plainly
 from xb_muscle_ros.protocols.inputs import pca_option
 from xb_muscle_ros.protocols.oscillating import NAME, oscillating, windows_of, with_corners
 from xb_muscle_ros.scores.complex_stiffness import ComplexStiffness, complex_stiffness
@@ -159,9 +159,12 @@ class Sinusoid(Protocol):
         nyquist.set_aspect("equal", adjustable="box")
         nyquist.margins(y=0.15)
         for axis in (magnitude, phase):
-            axis.set(xscale="log", xlabel="frequency (Hz)")
-        magnitude.set(yscale="log", ylabel="magnitude (F$_0$/L$_0$)")
-        plainly(magnitude.yaxis)
+            axis.set_xlabel("frequency (Hz)")
+        logarithmic(magnitude, y=True)
+        logarithmic(phase)
+        magnitude.set_ylabel("magnitude (F$_0$/L$_0$)")
+        if magnitude.get_yscale() == "log":
+            plainly(magnitude.yaxis)
         phase.set_ylabel("phase of force before length (°)")
         legend(magnitude)
         lettered([nyquist, magnitude, phase])

@@ -9,7 +9,7 @@ import numpy as np
 
 from xb_muscle_ros.protocols.base import Cell, Column, Found, Number, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.calcium import pulse_train, transient_of, transient_options
-from xb_muscle_ros.protocols.figures import legend, lettered, looks
+from xb_muscle_ros.protocols.figures import legend, lettered, logarithmic, looks
 from xb_muscle_ros.protocols.inputs import facts_of, rate_option
 from xb_muscle_ros.protocols.stimulation import begun_s, stimulated
 from xb_muscle_ros.scores.estimate import Missing, notes_of
@@ -99,7 +99,8 @@ class Tetani(Protocol):
         fusion.axhline(_FUSED, color="black", linewidth=0.6, linestyle=":")
         traces.set(xlabel="time after the first pulse (s)", ylabel="force (F$_0$)")
         for axis, text in ((force, "last peak above rest (F$_0$)"), (fusion, "fusion index")):
-            axis.set(xlabel="frequency of stimulation (1/s)", ylabel=text, xscale="log")
+            axis.set(xlabel="frequency of stimulation (1/s)", ylabel=text)
+            logarithmic(axis)
             axis.set_ylim(bottom=0.0)
         legend(force)
         lettered([traces, force, fusion])
