@@ -42,9 +42,10 @@ def test_load_is_held_and_replaying_the_length_gives_the_same_states(case: tuple
             steps, halvings = counts
             assert steps >= n - 1
             again = muscle.run(start, dt, states[:, -3].copy(), held)
-            # With smaller steps within, in one of thousands, the two differ by the error of the larger.
+            # With smaller steps within, in one of thousands, the two differ by the error of the larger from there on:
+            # the guard lets no step err by more.
             assert halvings <= 1
-            np.testing.assert_allclose(force_of(muscle, again), force_of(muscle, states), atol=1e-5 * halvings, rtol=0)
+            np.testing.assert_allclose(force_of(muscle, again), force_of(muscle, states), atol=1e-4 * halvings, rtol=0)
             if not halvings:
                 np.testing.assert_array_equal(again, states)
             assert np.sign(round(states[-1, -3], 7)) == np.sign(share - 1.0)
