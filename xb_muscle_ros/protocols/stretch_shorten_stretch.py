@@ -7,11 +7,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from xb_muscle_ros.protocols.base import Cell, Column, Found, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.figures import legend, lettered, looks
 from xb_muscle_ros.protocols.inputs import pca_option, rate_option
 from xb_muscle_ros.scores.readout import ISOMETRIC, SRS_CONDITIONING, SRS_TEST, read_off, references, relative_srs
 from xb_muscle_ros.trials.protocol import ALLOWED, StretchShortenStretch
+
+_MOST_TICKS = 10
 
 
 class StretchShortenStretches(Protocol):
@@ -76,6 +80,29 @@ class StretchShortenStretches(Protocol):
         traces.set(xlabel="time (s)", ylabel="force (F$_0$)")
         points.set(xlabel="recovery time (ms)", ylabel="SRS of the test stretch (F$_0$/L$_0$)")
         points.set_xscale("symlog", linthresh=1.0)
+        times_ms = sorted(
+            {float(each) for one in found for each in 1e3 * one.column("recovery_s") if np.isfinite(each)}
+        )
+        if 0 < len(times_ms) <= _MOST_TICKS:  # the times themselves: a decade may hold them all
+            points.set_xticks(times_ms, [f"{each:g}" for each in times_ms])
+            points.set_xticks([], minor=True)
         points.set_ylim(bottom=0.0)
+        _name_pca(points, found[:1])
         legend(points)
         lettered([traces, points])
+
+
+def _name_pca(axis: Any, found: Sequence[Found]) -> None:
+    """Say at the longest recovery of each pCa which it is, where there are several."""
+    for each in found:
+        pca, time_ms, srs = each.column("pca"), 1e3 * each.column("recovery_s"), each.column(SRS_TEST)
+        shown = np.isfinite(pca) & np.isfinite(time_ms) & np.isfinite(srs)
+        levels = sorted(set(pca[shown].tolist()))
+        for level in levels if len(levels) > 1 else ():
+            last = max(np.flatnonzero(shown & (pca == level)), key=lambda k: float(time_ms[k]))
+            axis.annotate(
+                f"pCa {level:g}", (time_ms[last], srs[last]), xytext=(5, 0), textcoords="offset points",
+                ha="left", va="center", fontsize="small",
+            )  # fmt: skip
+        if len(levels) > 1:
+            axis.margins(x=0.3)
