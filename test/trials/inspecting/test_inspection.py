@@ -220,6 +220,15 @@ def test_whatever_the_names_units_and_order_the_trial_is_the_same(
     assert trial.facts.pca == pytest.approx(6.0 - np.log10(0.8), abs=1e-6)
 
 
+def test_a_column_of_time_without_a_time_is_told(tmp_path: Path) -> None:
+    """It ended in an IndexError."""
+    file = tmp_path / "a.csv"
+    file.write_text("\tTIME\n0.0", encoding="utf-8")
+    found = inspect_file(file)
+    assert not found.imports
+    assert "no time is a finite number" in report(found)
+
+
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     header=st.lists(

@@ -42,6 +42,8 @@ def clock_of(times_s: Array, content: Content) -> Clock:
         content: the signal that they are of, for its places.
     """
     known = np.flatnonzero(np.isfinite(times_s))
+    if not known.size:
+        return Clock((0, 0), None, ("no time is a finite number",))
     times = times_s[known]
     bounds = tuple(bounds_of_runs(times) or (0, times.size))
     steps = np.diff(times)
