@@ -23,10 +23,11 @@ from xb_muscle_ros.trials.importing import (
     bag_name,
     find_recordings,
     import_recordings,
+    line_of,
     recorded_provenance,
 )
 from xb_muscle_ros.trials.readers.settings import ImportSettings
-from xb_muscle_ros.trials.trial import Trial
+from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
 
 TREE: dict[str, Any] = {
     "fibre": "f1",
@@ -51,6 +52,17 @@ def _run(files: list[Path], out: Path, overwrite: bool = False, **keys: Any) -> 
 
 def _kinds(events: list[importing.Event]) -> list[str]:
     return [type(event).__name__ for event in events if not isinstance(event, FileDone)]
+
+
+@pytest.mark.parametrize(("count", "end"), [(16, "hold@0.0150"), (700, "hold@0.0150 and 684 more phases")])
+def test_the_line_on_a_trial_tells_a_few_phases_and_how_many_more(count: int, end: str) -> None:
+    time_s = np.arange(count + 1) / 1000
+    phases = tuple(Phase("hold", i / 1000, (i + 1) / 1000) for i in range(count))
+    facts = TrialFacts("f1", "t1", 6.1, reference_length_m=7e-4, phases=phases)
+    trial = Trial(facts, time_s, np.full(time_s.size, 7e-4), np.zeros(1), np.array([0.8]), np.empty(0), np.empty(0))
+    line = line_of(trial)
+    assert line.endswith(end)
+    assert line.count("@") == 16
 
 
 def test_one_trial_is_written_before_the_next_is_read(tmp_path: Path) -> None:

@@ -25,6 +25,8 @@ from xb_muscle_ros.trials.trial import Trial
 SOURCE = "import_source"
 SETTINGS = "import_settings"
 _BLOCK_BYTES = 1 << 20
+# Phases in the line on a trial.
+_PHASES_TOLD = 16
 
 
 class Imported(NamedTuple):
@@ -110,7 +112,10 @@ def line_of(trial: Trial) -> str:
         parts.append(f"recovery {facts.recovery_s:g} s")
     if trial.force_n.size:
         parts.append(f"force {trial.measured_f0.min():.3f} to {trial.measured_f0.max():.3f} F0")
-    parts.append(" ".join(f"{phase.name}@{phase.start_s:.4f}" for phase in facts.phases))
+    phases = [f"{phase.name}@{phase.start_s:.4f}" for phase in facts.phases[:_PHASES_TOLD]]
+    if len(facts.phases) > len(phases):
+        phases.append(f"and {len(facts.phases) - len(phases)} more phases")
+    parts.append(" ".join(phases))
     return ", ".join(parts)
 
 
