@@ -50,7 +50,7 @@ def clamp(
 
     Raises:
         UserError: a value out of range, or a load that no length within the limits gives. A load above what the fibre
-            bears lengthens it step by step, until it gives way to the limit.
+            bears lengthens it step by step until the limit is reached.
         StateViolation: see `Muscle.step`.
     """
     name = muscle.fibre.name

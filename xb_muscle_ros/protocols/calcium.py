@@ -10,7 +10,7 @@ share that is left below a ceiling, which free calcium can therefore not pass in
 limited; one number stands for both). The default is a slow-twitch fibre of the mouse: in response to one action
 potential at 16 °C free calcium rises by 9.4 µM, for 7.7 ms at half of it (Baylor & Hollingworth 2003, J Physiol 551:
 125-138); the rise of 1.5 ms is set and the decay of 5.7 ms follows from it. Force does not act back on calcium. What
-`trials.activation` makes of recorded stimulation is a tetanus whose pulses are not told apart.
+`trials.activation` makes of recorded stimulation is a tetanus whose pulses are not resolved.
 """
 
 from __future__ import annotations

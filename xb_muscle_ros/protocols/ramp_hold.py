@@ -75,7 +75,7 @@ class RampAndHold(Protocol):
         return planned
 
     def analyse(self, fibre: str, of: str, runs: Sequence[Run]) -> Found:
-        """What each ramp does to the force, and what is left of it after the hold."""
+        """Change of force by each ramp, and how much of it remains after the hold."""
         rows, told = [], []
         for run in runs:
             row, whys = _row(run)

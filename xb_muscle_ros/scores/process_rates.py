@@ -31,7 +31,7 @@ from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.trials.trial import Array
 
 Complex = npt.NDArray[np.complex128]
-# What is left of the modulus that needs no further process.
+# Unexplained part of the modulus below which no further process is added.
 _ENOUGH = 0.005
 _CHANCE = 0.01
 _WIDEST, _NEAREST = 10.0, 1.5

@@ -57,7 +57,7 @@ def quick_recovery(
         noise: of the force; None for simulated force.
 
     Returns:
-        nothing where fewer than 12 samples lie in the window or two phases cannot be told apart.
+        nothing where fewer than 12 samples lie in the window or two phases cannot be distinguished.
     """
     inside = (time_s >= end_s - 5e-10) & (time_s <= end_s + window_s + 5e-10)
     t, force = time_s[inside] - end_s, force_f0[inside]

@@ -139,7 +139,7 @@ def _last(held: str, cell: str) -> str:
 
 
 def _joined(names: list[str], above: list[str]) -> list[str]:
-    """Names that come twice, told apart by the row above, whose cells hold until the next one."""
+    """Names that come twice, distinguished by the row above, whose cells hold until the next one."""
     twice = {name for name in names if name and names.count(name) > 1}
     if not twice or sum(map(bool, above)) < 2 or any(map(like_number, filter(None, above))):
         return names

@@ -84,7 +84,7 @@ def _told(path: Path) -> Iterator[None]:
 def _read_mat5(path: Path, names: tuple[str, ...] | None) -> Struct:
     wanted = None if names is None else [*names, _UNNAMED, _WORKSPACE]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # several objects of one name: they are told apart below
+        warnings.simplefilter("ignore")  # several objects of one name: they are distinguished below
         content = _loadmat(path, wanted)
     reading = _Reading(content.pop(_WORKSPACE, None))
     found = {name: reading.node(value) for name, value in content.items() if not name.startswith("__")}

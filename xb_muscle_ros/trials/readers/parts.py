@@ -43,7 +43,7 @@ class Part(NamedTuple):
 
 
 def parts_of(table: Table, mapping: ImportMapping) -> tuple[list[Part], tuple[str, ...]]:
-    """The trials in a table, and lines on how they are told apart.
+    """The trials in a table, and lines on how they are distinguished.
 
     Rows are split by the trial column, by blocks of the file, or by time that starts anew; columns by patterns.
 
@@ -64,7 +64,7 @@ def parts_of(table: Table, mapping: ImportMapping) -> tuple[list[Part], tuple[st
 
 
 def _rows(table: Table, mapping: ImportMapping, asides: list[Aside]) -> tuple[list[tuple[str, Indices]], str]:
-    """Rows of trials that are below each other, with what their names have, and how they are told apart."""
+    """Rows of trials that are below each other, with what their names have, and how they are distinguished."""
     everything = np.arange(len(table.rows))
     found = _by_column(table, mapping)
     if found is None and len(table.starts) > 1:
