@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import tracemalloc
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -260,3 +261,20 @@ def test_trials_that_would_have_one_name_are_named(tmp_path: Path) -> None:
 )
 def test_bag_names_are_plain(data_set: str, trial: str, name: str) -> None:
     assert bag_name(data_set, trial) == name
+
+
+def test_memory_of_an_import_is_that_of_its_samples(tmp_path: Path) -> None:
+    """Neither text nor cells of a large table are kept: less than 100 bytes a row of three numbers."""
+
+    def peak_bytes(rows: int) -> int:
+        path = tmp_path / f"t{rows}.csv"
+        path.write_text("\n".join(["t,l,f", *(f"{i / 1000:.3f},1.05000,0.30000" for i in range(rows))]))
+        tracemalloc.start()
+        try:
+            assert _kinds(_run([path], tmp_path / "bags")) == ["Imported"]
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    more = peak_bytes(800_000) - peak_bytes(400_000)
+    assert more < 400_000 * 100

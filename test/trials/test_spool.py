@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import pickle
 
 import numpy as np
 import pytest
 
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import spool
-from xb_muscle_ros.trials.spool import is_settled, release, roomy
+from xb_muscle_ros.trials.spool import is_settled, release, roomy, settle, spooled
 from xb_muscle_ros.trials.trial import Trial, TrialFacts, frozen
 
 
@@ -30,6 +32,44 @@ def test_without_a_place_for_files_arrays_are_in_memory(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(spool.os, "posix_fallocate", full)
     assert roomy(spool.LEAST).base is None
+
+
+def test_many_bytes_lie_in_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spool, "LEAST", 10)
+    blocks = [bytes([i]) * 30 for i in range(9)]
+    assert spooled(blocks[:2]) == b"".join(blocks[:2])
+    assert isinstance(spooled(blocks[:2]), bytes)
+    found = spooled(iter(blocks))
+    assert isinstance(found, spool.Spool)
+    assert found[:] == b"".join(blocks)
+    release(found)
+    assert found[269:] == b"\x08"
+    assert spooled([]) == b""
+
+
+def test_no_room_for_a_file_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Full(io.BytesIO):
+        def write(self, _: object) -> int:
+            raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(spool, "LEAST", 10)
+    monkeypatch.setattr(spool.tempfile, "TemporaryFile", Full)
+    with pytest.raises(UserError, match="cannot be written: No space left on device; make room there, or name"):
+        spooled([b"1" * 100])
+
+
+def test_a_part_of_an_array_in_a_file_is_let_go_and_settled_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spool, "LEAST", 1000)
+    whole = roomy(4000).reshape(2, 2000)
+    whole[:] = np.arange(4000.0).reshape(2, 2000)
+    part = whole[1, 10:20]
+    assert not is_settled(part)
+    assert settle(part) is part
+    assert is_settled(part)
+    assert is_settled(whole[0])  # made after
+    assert frozen(part) is part
+    release(part)
+    assert part.tolist() == list(range(2010, 2020))
 
 
 def test_only_what_nobody_can_change_is_shared() -> None:

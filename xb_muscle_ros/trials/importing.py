@@ -111,7 +111,7 @@ def line_of(trial: Trial) -> str:
     if facts.recovery_s is not None:
         parts.append(f"recovery {facts.recovery_s:g} s")
     if trial.force_n.size:
-        parts.append(f"force {trial.measured_f0.min():.3f} to {trial.measured_f0.max():.3f} F0")
+        parts.append(f"force {trial.force_n.min() / facts.f0_n:.3f} to {trial.force_n.max() / facts.f0_n:.3f} F0")
     phases = [f"{phase.name}@{phase.start_s:.4f}" for phase in facts.phases[:_PHASES_TOLD]]
     if len(facts.phases) > len(phases):
         phases.append(f"and {len(facts.phases) - len(phases)} more phases")

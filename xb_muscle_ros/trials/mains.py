@@ -51,11 +51,14 @@ def hum_of_mains(time_s: Array, force_f0: Array) -> tuple[float, float] | None:
 
 def hum_line(trial: Trial) -> str:
     """One line on the hum in a trial's force before its first change of length; empty where there is none."""
-    if trial.force_time_s.size < _LEAST or not _even(trial.force_time_s):
+    isometric = initial_isometric(trial.force_time_s, trial.facts.phases)
+    inside = slice(max(isometric.stop - _MOST, 0), isometric.stop)
+    time_s = trial.force_time_s[inside]
+    if time_s.size < _LEAST or not _even(time_s):
         return ""
-    inside = initial_isometric(trial.force_time_s, trial.facts.phases)
-    found = hum_of_mains(trial.force_time_s[inside], trial.measured_f0[inside])
-    if found is None:
+    found = hum_of_mains(time_s, trial.force_n[inside] / trial.facts.f0_n)
+    # A notch needs even samples everywhere.
+    if found is None or not _even(trial.force_time_s):
         return ""
     mains = min(MAINS_HZ, key=lambda hz: abs(hz - found[0]))
     return (

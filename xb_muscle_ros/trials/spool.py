@@ -1,4 +1,4 @@
-"""Large arrays in a temporary file, which the system writes out where memory is short.
+"""Large arrays and texts in a temporary file, which the system writes out where memory is short.
 
 What a model answers to an hour at 1 kHz is 250 MB. It is made and looked at from begin to end, so that most of it need
 not be in memory at any time.
@@ -6,12 +6,17 @@ not be in memory at any time.
 
 from __future__ import annotations
 
+import itertools
 import mmap
 import os
 import tempfile
+from collections.abc import Iterable, Iterator
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
+
+from xb_muscle_ros.errors import UserError
 
 Array = npt.NDArray[np.float64]
 
@@ -20,7 +25,7 @@ LEAST = 1 << 20
 
 
 class Spool(mmap.mmap):
-    """The file, which has no name, of one array."""
+    """The file, which has no name, of one array or text."""
 
 
 def roomy(size: int) -> Array:
@@ -36,19 +41,69 @@ def roomy(size: int) -> Array:
         return np.zeros(size)
 
 
-def release(*arrays: Array) -> None:
-    """Let go of the memory of arrays made by `roomy`; they keep what they hold and are read again where needed."""
+def spooled(blocks: Iterable[bytes]) -> bytes | Spool:
+    """Bytes put behind each other, in a file where they are many.
+
+    Raises:
+        UserError: there is no room for the file.
+    """
+    held, size, more = [], 0, iter(blocks)
+    for block in more:
+        held.append(block)
+        size += len(block)
+        if size >= 8 * LEAST:
+            break
+    else:
+        return b"".join(held)
+    with tempfile.TemporaryFile() as file:
+        for block in itertools.chain(held, more):
+            _write(file, block)
+        _write(file, b"")
+        return Spool(file.fileno(), file.tell(), access=mmap.ACCESS_READ)
+
+
+def _write(file: IO[bytes], block: bytes) -> None:
+    try:
+        file.write(block)
+        if not block:
+            file.flush()
+    except OSError as problem:
+        raise UserError(
+            f"a temporary file in {tempfile.gettempdir()} cannot be written: {problem.strerror}; make room there, or "
+            "name another folder in the environment variable TMPDIR"
+        ) from problem
+
+
+def release(*arrays: Array | bytes | Spool) -> None:
+    """Let go of the memory of what is in such files: arrays or parts of arrays, with all they are a part of, and texts.
+
+    They keep what they hold and are read again where needed.
+    """
     for array in arrays:
-        if isinstance(array.base, Spool) and hasattr(mmap, "MADV_DONTNEED"):
-            array.base.madvise(mmap.MADV_DONTNEED)
+        spool = list(_bases(array))[-1]
+        if isinstance(spool, Spool) and hasattr(mmap, "MADV_DONTNEED"):
+            spool.madvise(mmap.MADV_DONTNEED)
+
+
+def settle(array: Array) -> Array:
+    """The array, which nobody can change from now on, nor what it is a part of, but by parts that were taken before."""
+    for each in _bases(array):
+        if isinstance(each, np.ndarray):
+            each.setflags(write=False)
+    return array
 
 
 def is_settled(array: npt.ArrayLike) -> bool:
     """Whether nobody can change an array: it is read-only, and so is every array whose memory it shares."""
-    while isinstance(array, np.ndarray):
-        if array.flags.writeable:
-            return False
-        if array.base is None or isinstance(array.base, Spool):
-            return True
+    *arrays, last = _bases(array)
+    if any(each.flags.writeable for each in arrays):
+        return False
+    return not last.flags.writeable if isinstance(last, np.ndarray) else isinstance(last, Spool)
+
+
+def _bases(array: object) -> Iterator[Any]:
+    """An array, what it is a part of, and so on."""
+    yield array
+    while isinstance(array, np.ndarray) and array.base is not None:
         array = array.base
-    return False
+        yield array

@@ -9,6 +9,8 @@ import lab_tables as lab
 import pytest
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials import spool
+from xb_muscle_ros.trials.readers import encoding as encodings
 
 NAME = "length (µm)"
 COLUMNS = {**lab.COLUMNS, "length": {"column": NAME}}
@@ -55,3 +57,45 @@ def test_an_encoding_that_does_not_fit_is_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(UserError, match="encoding is 'klingon'; needed is one that Python knows"):
         lab.run(path, COLUMNS, encoding="klingon")
+
+
+@pytest.mark.parametrize("block", [1, 2, 3, 7, 1000])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "cp1252", "latin-1"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_blocks_and_a_file_for_large_texts_change_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, encoding: str, end: str, block: int
+) -> None:
+    if block == 1 and encoding.startswith("utf-16-"):
+        block = 4  # its zeros show in the first two characters
+    if encoding in ("cp1252", "latin-1") and end == "\r":
+        encoding = "mac_roman"
+    path = lab.write(tmp_path, end.join(LINES).encode(encoding))
+    whole = encodings.read_text(path)
+    monkeypatch.setattr(encodings, "_BLOCK_BYTES", block)
+    monkeypatch.setattr(spool, "LEAST", 10)
+    found = encodings.read_text(path, None if block > 3 else "utf-8-sig" if encoding == "utf-8" else encoding)
+    assert isinstance(whole.utf8, bytes)
+    assert isinstance(found.utf8, spool.Spool)
+    assert found.utf8[:] == whole.utf8 == "".join(f"{line}\n" for line in LINES).encode()
+    if block > 3:
+        assert found.notice == whole.notice
+
+
+@pytest.mark.parametrize("block", [5, 64, 100_000])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_the_line_at_fault_is_named_whatever_the_blocks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, block: int, end: str
+) -> None:
+    monkeypatch.setattr(encodings, "_BLOCK_BYTES", block)
+    lines = ["time_s,length_mm,force_mN", *["0.001,2,3"] * 30, "# 20 °C", *["0.001,2,3"] * 30]
+    path = lab.write(tmp_path, end.join(lines).encode("cp1252"))
+    assert "line 32 is no UTF-8; the file is read as Windows-1252" in encodings.read_text(path).notice
+    with pytest.raises(UserError, match=r"line 32 is no utf-8 text \(invalid start byte\)"):
+        encodings.read_text(path, "utf-8")
+
+
+def test_a_zero_anywhere_is_no_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(encodings, "_BLOCK_BYTES", 8)
+    path = lab.write(tmp_path, b"a,b\n1,2\n3,4\n5,\x006\n")
+    with pytest.raises(UserError, match="is no text; export the recording as CSV or TSV"):
+        encodings.read_text(path)

@@ -17,6 +17,7 @@ from xb_muscle_ros.trials.readers.description import ImportMapping, filled
 from xb_muscle_ros.trials.readers.force import read_force
 from xb_muscle_ros.trials.readers.length import Length, read_length
 from xb_muscle_ros.trials.readers.plausibility import SPIKE_F0, warn_of_f0, warn_of_force, warn_of_spikes
+from xb_muscle_ros.trials.spool import release, settle
 from xb_muscle_ros.trials.stamps import GAP_STEPS
 from xb_muscle_ros.trials.trial import Array, Trial, TrialFacts
 
@@ -48,16 +49,19 @@ def trial_of(recording: Recording, mapping: ImportMapping, path: Path, isometric
     given, signal = recording.facts, recording.signals.get("force")
     _check_facts(draft)
     clock = read_clock(draft)
+    release(recording.signals["time"].values)
     length = read_length(draft, clock.time_s)
     calcium = read_calcium(draft, clock)
     force_s = clock.time_s if signal is None else times_of(signal, clock, draft)
     force = read_force(draft, force_s, length.phases, calcium.pca, isometric_scaling)
+    release(*(each.values for each in recording.signals.values()))
     force_f0 = force.force_n / force.f0_n
     if signal is not None and signal.times is not None:
         _check_cover(draft, signal, clock.time_s, force_s)
     warn_of_force(draft, force_f0, calcium.pca)
     if signal is not None:
         warn_of_spikes(draft, signal, force_f0, SPIKE_F0, "F0")
+    del force_f0
     warn_of_f0(draft, force.f0_n, length.reference_m)
     _check_onset(draft, length)
     amplitude_l0, recovery_s = conditioning(clock.time_s, length.length_m, length.reference_m, length.phases)
@@ -75,12 +79,12 @@ def trial_of(recording: Recording, mapping: ImportMapping, path: Path, isometric
     )
     trial = Trial(
         facts=facts,
-        time_s=clock.time_s,
-        length_m=length.length_m,
+        time_s=settle(clock.time_s),
+        length_m=settle(length.length_m),
         calcium_time_s=calcium.time_s,
         calcium_um=calcium.calcium_um,
-        force_time_s=force.time_s,
-        force_n=force.force_n,
+        force_time_s=settle(force.time_s),
+        force_n=settle(force.force_n),
     )
     if mapping.notch_hz:
         with naming(draft.where):

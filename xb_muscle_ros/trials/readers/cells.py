@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import math
 import re
+from array import array
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -90,20 +91,20 @@ def is_clock(cell: Cell) -> bool:
     return isinstance(cell, str) and _CLOCK.fullmatch(cell.strip()) is not None
 
 
-def clock_seconds(cells: Sequence[Cell]) -> Array | None:
+def clock_seconds(cells: Iterable[str]) -> Array | None:
     """Times of a clock in s, shape (n,): from 0:00:00, or from midnight of the first day where a date changes.
 
     None where a cell is none, or where the date changes and is not written as year-month-day.
     """
-    matches = [_CLOCK.fullmatch(cell.strip()) if isinstance(cell, str) else None for cell in cells]
-    found = [match for match in matches if match is not None]
-    if not found or len(found) < len(matches):
-        return None
-    days = _days([match["date"] for match in found])
-    if days is None:
-        return None
-    times = [_seconds(match) for match in found]
-    return np.array([86400.0 * day + time for day, time in zip(days, times, strict=True)])
+    seconds, days, dates = array("d"), array("q"), dict[str | None, int]()
+    for cell in cells:
+        match = _CLOCK.fullmatch(cell)
+        if match is None:
+            return None
+        seconds.append(_seconds(match))
+        days.append(dates.setdefault(match["date"], len(dates)))
+    offsets = _offsets_s(list(dates))
+    return None if offsets is None else np.array(seconds) + offsets[np.array(days)]
 
 
 def _seconds(match: re.Match[str]) -> float:
@@ -113,12 +114,12 @@ def _seconds(match: re.Match[str]) -> float:
     return 3600.0 * hours + 60.0 * int(match["minutes"]) + float(match["seconds"].replace(",", "."))
 
 
-def _days(dates: Sequence[str | None]) -> list[int] | None:
-    """Days since the first date."""
-    if len(set(dates)) == 1:
-        return [0] * len(dates)
+def _offsets_s(dates: Sequence[str | None]) -> Array | None:
+    """Midnight of each date since that of the first, s."""
+    if len(dates) == 1:
+        return np.zeros(1)
     try:
-        known = {date: datetime.date.fromisoformat(date or "").toordinal() for date in set(dates)}
+        known = [datetime.date.fromisoformat(date or "").toordinal() for date in dates]
     except ValueError:
         return None
-    return [known[date] - known[dates[0]] for date in dates]
+    return 86400.0 * np.array([day - known[0] for day in known]) if known else None

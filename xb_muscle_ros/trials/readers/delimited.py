@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from array import array
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
+
+import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.cells import COMMA
@@ -17,6 +20,7 @@ from xb_muscle_ros.trials.readers.making import Head, head_of, locate, make_tabl
 from xb_muscle_ros.trials.readers.options import TableOptions
 from xb_muscle_ros.trials.readers.rows import SPACES, TextRows, split
 from xb_muscle_ros.trials.readers.table import Table
+from xb_muscle_ros.trials.readers.text_lines import TextLines, lines_of
 
 _DELIMITERS = ("\t", ";", ",", SPACES)
 # Excel tells itself the delimiter in a line before the header.
@@ -28,15 +32,10 @@ _BY_CHANNEL = re.compile(r'"?(INFORMATION|SUMMARY|CHANNEL)"?\b')
 
 
 class _Lines(NamedTuple):
-    """Lines of a file that are neither empty nor comments, their numbers from 1, and the comments with theirs."""
+    """Lines of a file that are neither empty nor comments, and the comments."""
 
-    texts: list[str]
-    numbers: array[int]
-    comments: list[tuple[int, str]]
-
-    def after(self, place: int) -> _Lines:
-        """Those from a place on."""
-        return _Lines(self.texts[place:], self.numbers[place:], self.comments)
+    texts: TextLines
+    comments: TextLines
 
 
 def read_table(path: Path, options: TableOptions | None = None) -> Table:
@@ -48,11 +47,10 @@ def read_table(path: Path, options: TableOptions | None = None) -> Table:
     """
     options = options or TableOptions()
     text, encoding = read_text(path, options.encoding)
-    lines = _lines(text)
-    del text  # an hour at 1 kHz is 100 MB
+    lines = _Lines(*lines_of(text, lambda line: not _MISSING.match(line)))
     separator = _SEPARATOR_LINE.fullmatch(lines.texts[0].strip()) if lines.texts else None
     if separator is not None:
-        lines = lines.after(1)
+        lines = lines._replace(texts=lines.texts[1:])
     if not lines.texts:
         raise UserError(f"{path} is empty; needed are a header line and rows of numbers")
     export = find_export(str(path), lines.texts) if options.header is None else None
@@ -66,58 +64,36 @@ def read_table(path: Path, options: TableOptions | None = None) -> Table:
     return _table(path, lines, separator.group(1) if separator else None, options, encoding)
 
 
-def _lines(text: str) -> _Lines:
-    """Lines that may be part of a table."""
-    texts = text.splitlines()
-    comments, out = [], set()
-    for i, line in enumerate(texts):
-        if line.startswith("#") and not _MISSING.match(line):
-            comments.append((i + 1, line))
-            out.add(i)
-        elif not line or line.isspace():
-            out.add(i)
-    numbers = array("q", range(1, len(texts) + 1))
-    if out:
-        texts = [line for i, line in enumerate(texts) if i not in out]
-        numbers = array("q", (number for number in numbers if number - 1 not in out))
-    return _Lines(texts, numbers, comments)
-
-
 def _table(path: Path, lines: _Lines, separator: str | None, options: TableOptions, encoding: str) -> Table:
     """A table below a header that may have other lines above it, and may come again."""
     commented = _commented_header(lines, separator, options.wanted)
     if commented is not None and options.header is None:
         lines, options = commented.lines, options._replace(header=str(commented.number))
-    texts, numbers = lines.texts, lines.numbers
+    texts, numbers = lines.texts, lines.texts.numbers[:LOOKED_AT].tolist()
     marks = (separator,) if separator is not None else _DELIMITERS
     splits = {mark: [split(_bare(line), mark) for line in texts[:LOOKED_AT]] for mark in marks}
     mark, found = locate(str(path), TextRows.word, numbers, splits, options)
     head = head_of(TextRows.word, numbers, splits[mark], found)
     if mark == SPACES and found.header is not None:
         _check_names(f"{path}, line {numbers[found.header]}", head.names, splits[mark][found.first : found.first + 1])
-    above = [*texts[: found.header or 0], *(line for _, line in lines.comments)]
-    body = lines.after(found.first)
+    above = [*texts[: found.header or 0], *lines.comments]
+    body = texts[found.first :]
     starts: tuple[int, ...] = (0,)
-    if found.header is not None and texts[found.header] in body.texts:
-        body, starts = _blocks(body, texts[found.header : found.first])
+    if found.header is not None and texts[found.header] in body:
+        body, starts = _blocks(body, list(texts[found.header : found.first]))
         head = head._replace(notices=(*head.notices, f"its header comes {len(starts)} times, above a trial each"))
-    while body.texts and not body.texts[-1].strip(f'{mark} \t"'):  # rows a spreadsheet adds
-        body.texts.pop()
-        body.numbers.pop()
-    return make_table(
-        path, "", head, TextRows(body.texts, body.numbers, mark), options, (encoding,), starts, rate_of(above)
-    )
+    end = len(body)
+    while end and not body[end - 1].strip(f'{mark} \t"'):  # rows a spreadsheet adds
+        end -= 1
+    rows = TextRows(body[:end], body.numbers[:end], mark)
+    return make_table(path, "", head, rows, options, (encoding,), starts, rate_of(above))
 
 
 def _exported(path: Path, lines: _Lines, export: Export, options: TableOptions, encoding: str) -> Table:
     """The blocks of a table whose program says where they are."""
-    body = _Lines([], array("q"), [])
-    starts = []
-    for block in export.blocks:
-        if block.end > block.first:
-            starts.append(len(body.texts))
-            body.texts.extend(lines.texts[block.first : block.end])
-            body.numbers.extend(lines.numbers[block.first : block.end])
+    places = [np.arange(block.first, block.end) for block in export.blocks if block.end > block.first]
+    starts = [0, *itertools.accumulate(each.size for each in places[:-1])]
+    body = lines.texts.take(np.concatenate([np.empty(0, int), *places]))
     what = f"{path} is a text file of {export.program}"
     more = f" with {len(starts)} blocks, a trial each" if len(starts) > 1 else ""
     rates = {block.rate_hz for block in export.blocks}
@@ -131,10 +107,10 @@ def _exported(path: Path, lines: _Lines, export: Export, options: TableOptions, 
         path,
         "",
         Head(export.header, units),
-        TextRows(body.texts, body.numbers, export.delimiter),
+        TextRows(body, body.numbers, export.delimiter),
         options,
         (encoding, told, comma),
-        tuple(starts) or (0,),
+        tuple(starts),
         rate,
     )
 
@@ -153,16 +129,14 @@ def _commented_header(lines: _Lines, separator: str | None, wanted: Wanted) -> _
     def names(line: str) -> bool:
         return any(wanted.named_by([plain(cell) for cell in split(line, mark)]) for mark in marks)
 
-    if not any(names(line.lstrip("# ")) for _, line in lines.comments):
+    comments = lines.comments
+    found = next((i for i, line in enumerate(comments) if names(line.lstrip("# "))), None)
+    if found is None or any(names(_bare(line)) for line in lines.texts[:LOOKED_AT]):
         return None
-    if any(names(_bare(line)) for line in lines.texts[:LOOKED_AT]):
-        return None
-    number, text = next((i, line.lstrip("# ")) for i, line in lines.comments if names(line.lstrip("# ")))
-    place = sum(i < number for i in lines.numbers[:LOOKED_AT])
-    texts, numbers = [*lines.texts], lines.numbers[:]
-    texts.insert(place, text)
-    numbers.insert(place, number)
-    return _Commented(_Lines(texts, numbers, [each for each in lines.comments if each[0] != number]), number)
+    number, sign = int(comments.numbers[found]), len(comments[found]) - len(comments[found].lstrip("# "))
+    place = int(np.searchsorted(lines.texts.numbers[:LOOKED_AT], number))
+    texts = lines.texts.with_line(place, comments[found : found + 1], sign)
+    return _Commented(_Lines(texts, comments.take(np.delete(np.arange(len(comments)), found))), number)
 
 
 def _check_names(where: str, names: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
@@ -174,21 +148,20 @@ def _check_names(where: str, names: Sequence[str], rows: Sequence[Sequence[str]]
         )
 
 
-def _blocks(body: _Lines, head: Sequence[str]) -> tuple[_Lines, tuple[int, ...]]:
+def _blocks(body: TextLines, head: Sequence[str]) -> tuple[TextLines, tuple[int, ...]]:
     """Rows without the headers that come again, and where the blocks below them begin."""
-    rows, starts, skip = _Lines([], array("q"), body.comments), [0], 0
-    for text, number in zip(body.texts, body.numbers, strict=True):
+    rows, starts, skip = array("q"), [0], 0
+    for place, text in enumerate(body):
         if text == head[0]:
             skip = len(head)
-            if len(rows.texts) > starts[-1]:
-                starts.append(len(rows.texts))
+            if len(rows) > starts[-1]:
+                starts.append(len(rows))
         if skip and text in head:
             skip -= 1
             continue
         skip = 0
-        rows.texts.append(text)
-        rows.numbers.append(number)
-    return rows, tuple(start for start in starts if start < len(rows.texts))
+        rows.append(place)
+    return body.take(np.array(rows)), tuple(start for start in starts if start < len(rows))
 
 
 def _bare(line: str) -> str:

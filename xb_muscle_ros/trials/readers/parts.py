@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.description import ImportMapping
@@ -70,7 +69,7 @@ def _rows(table: Table, mapping: ImportMapping, asides: list[Aside]) -> tuple[li
     if found is None and len(table.starts) > 1:
         bounds = [*table.starts, everything.size]
         found = _numbered(bounds), f"the table has {len(table.starts)} blocks, a trial each"
-    found = found or _by_time(table, mapping, asides[0].columns["time"])
+    found = found or _by_time(table, mapping, asides[0].columns["time"], everything)
     if found is None or len(found[0]) < 2:
         return [("", everything)], ""
     return found
@@ -85,44 +84,47 @@ def _by_column(table: Table, mapping: ImportMapping) -> tuple[list[tuple[str, In
     name = asked or next((each for each in table.header if each.casefold() == TRIAL_COLUMN), None)
     if name is None:
         return None
-    texts = np.array(table.texts(name))
-    empty = np.flatnonzero(texts == "")
+    numbers: dict[str, int] = {}  # of values, in the order in which they come first
+    found = (numbers.setdefault(text, len(numbers)) for text in table.texts(name))
+    codes = np.fromiter(found, np.int32, len(table.rows))
+    values = list(numbers)
+    empty = np.flatnonzero(codes == numbers.get("", -1))
     if empty.size and asked:
         raise UserError(
             f"{table.where}, {table.place(int(empty[0]))}, column '{name}' holds nothing; needed is the name or "
             "number of the trial; fill it in"
         )
-    values = list(dict.fromkeys(texts.tolist()))
-    by_value = {value: np.flatnonzero(texts == value) for value in values}
-    if not asked and (empty.size or min(rows.size for rows in by_value.values()) < _LEAST_SAMPLES):
+    if not asked and (empty.size or np.min(np.bincount(codes)) < _LEAST_SAMPLES):
         return None  # it numbers something else
-    blocks = np.split(np.arange(texts.size), np.flatnonzero(texts[1:] != texts[:-1]) + 1)
+    blocks = np.split(np.arange(codes.size), np.flatnonzero(codes[1:] != codes[:-1]) + 1)
     if len(blocks) == len(values) or min(block.size for block in blocks) < _LEAST_SAMPLES:
-        return list(by_value.items()), f"column '{name}' tells {len(values)} trials apart"
-    return list(_repeated(texts, blocks)), (
-        f"column '{name}' tells {len(blocks)} trials apart: {_again(texts, blocks)}, each time a trial of its own"
+        by_value = [(value, np.flatnonzero(codes == code)) for value, code in numbers.items()]
+        return by_value, f"column '{name}' tells {len(values)} trials apart"
+    begins = [values[codes[block[0]]] for block in blocks]
+    return list(_repeated(begins, blocks)), (
+        f"column '{name}' tells {len(blocks)} trials apart: {_again(begins)}, each time a trial of its own"
     )
 
 
-def _repeated(texts: npt.NDArray[np.str_], blocks: list[Indices]) -> Iterator[tuple[str, Indices]]:
+def _repeated(begins: list[str], blocks: list[Indices]) -> Iterator[tuple[str, Indices]]:
     """Blocks of one value, a trial each; the second of a value and those after it have their number behind it."""
     seen: dict[str, int] = {}
-    for block in blocks:
-        value = str(texts[block[0]])
+    for value, block in zip(begins, blocks, strict=True):
         seen[value] = seen.get(value, 0) + 1
         yield (value if seen[value] == 1 else f"{value}_{seen[value]}"), block
 
 
-def _again(texts: npt.NDArray[np.str_], blocks: list[Indices]) -> str:
-    begins = [str(texts[block[0]]) for block in blocks]
+def _again(begins: list[str]) -> str:
     often = {value: begins.count(value) for value in dict.fromkeys(begins) if begins.count(value) > 1}
     return ", ".join(f"'{value}' comes {count} times" for value, count in often.items())
 
 
-def _by_time(table: Table, mapping: ImportMapping, column: str) -> tuple[list[tuple[str, Indices]], str] | None:
+def _by_time(
+    table: Table, mapping: ImportMapping, column: str, everything: Indices
+) -> tuple[list[tuple[str, Indices]], str] | None:
     if mapping.rate_hz is not None or mapping.time.pattern is not None:
         return None
-    bounds = bounds_of_runs(table.times(column, np.arange(len(table.rows)))[0])
+    bounds = bounds_of_runs(table.times(column, everything)[0])
     if bounds is None:
         return None
     parts = _numbered(bounds)

@@ -8,7 +8,6 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.calcium import PCA_COLUMN, SAME_PCA, pcas_in
-from xb_muscle_ros.trials.readers.cells import number
 from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.readers.parts import Part
 from xb_muscle_ros.trials.readers.table import Table
@@ -44,8 +43,7 @@ def check_pca(table: Table, mapping: ImportMapping, part: Part, pca: float | Non
 
 
 def _check_column(table: Table, name: str, part: Part, pca: float) -> None:
-    texts = table.texts(name)
-    values = np.array([number(texts[row], table.decimal) for row in part.rows])
+    values = table.rows.column(table.index(name), table.decimal)[part.rows]
     with np.errstate(invalid="ignore"):
         if not np.all((values >= 1.0) & (values <= 12.0)):
             return  # no pCa
@@ -53,6 +51,6 @@ def _check_column(table: Table, name: str, part: Part, pca: float) -> None:
     if other.size:
         row = int(part.rows[other[0]])
         raise UserError(
-            f"{table.where}, {table.place(row)}, column '{name}' holds {texts[row]}, but pCa is given as {pca:g} "
-            f"for the whole trial; read the column with --calcium-column '{name}' --calcium-unit pCa"
+            f"{table.where}, {table.place(row)}, column '{name}' holds {table.text(name, row)}, but pCa is given as "
+            f"{pca:g} for the whole trial; read the column with --calcium-column '{name}' --calcium-unit pCa"
         )

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import re
-from collections.abc import Iterator, Sequence
-from functools import cached_property
-from typing import Protocol
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Protocol, overload
 
 import numpy as np
 
-from xb_muscle_ros.trials.readers.cells import COMMA, Cell
+from xb_muscle_ros.trials.readers.cells import COMMA, Cell, number
+from xb_muscle_ros.trials.readers.text_lines import Places
+from xb_muscle_ros.trials.spool import release, roomy, settle
 from xb_muscle_ros.trials.trial import Array
 
 SPACES = " "
+# Rows that are read in one go.
+_BLOCK = 1 << 16
 # A unit in brackets belongs to the name before it.
 _WORD = re.compile(r"\S+(?:[ \t]+[(\[][^)\]]*[)\]])?")
 
@@ -40,6 +44,9 @@ class Rows(Protocol):
     def matrix(self, decimal: str) -> Array | None:
         """All numbers at once, shape (rows, columns), where every cell is one and rows are equally long."""
 
+    def column(self, index: int, decimal: str) -> Array:
+        """Numbers of a column, shape (rows,): nan where a cell is missing or is none; not to be changed."""
+
     def holding(self, mark: str) -> Iterator[tuple[int, str]]:
         """Row's number and text of cells that hold a sign."""
 
@@ -49,10 +56,11 @@ class TextRows:
 
     word = "line"
 
-    def __init__(self, lines: Sequence[str], numbers: Sequence[int], delimiter: str) -> None:
+    def __init__(self, lines: Sequence[str], numbers: Sequence[int] | Places, delimiter: str) -> None:
         """Take lines without those that are no rows; `SPACES` stands for any number of blanks and tabs."""
         self._lines, self._numbers, self._delimiter = lines, numbers, delimiter
         self._matrices: dict[str, Array | None] = {}
+        self.cells: Sequence[list[str]] = _Split(lines, delimiter)
 
     def __len__(self) -> int:
         """How many there are."""
@@ -60,12 +68,7 @@ class TextRows:
 
     def number(self, row: int) -> int:
         """Line in the file."""
-        return self._numbers[row]
-
-    @cached_property
-    def cells(self) -> list[list[str]]:
-        """Each line split."""
-        return [split(line, self._delimiter) for line in self._lines]
+        return int(self._numbers[row])
 
     def matrix(self, decimal: str) -> Array | None:
         """Read by NumPy's parser, which takes the same for numbers as Python does, but for ``1_000``."""
@@ -73,28 +76,98 @@ class TextRows:
             self._matrices[decimal] = self._read(decimal)
         return self._matrices[decimal]
 
+    def column(self, index: int, decimal: str) -> Array:
+        """Blocks of rows that NumPy cannot read are read cell by cell."""
+        matrix = self.matrix(decimal)
+        if matrix is not None:
+            return matrix[:, index] if index < matrix.shape[1] else np.full(len(self), np.nan)
+        found = roomy(len(self))
+        first = 0
+        for lines in _blocks(self._lines):
+            block = None if self._is_quoted(lines) else self._parsed(lines, decimal, index)
+            here = found[first : first + len(lines)]
+            if block is not None:
+                here[:] = block[:, 0]
+            else:
+                rows = (split(line, self._delimiter) for line in lines)
+                here[:] = [number(cells[index].strip(), decimal) if index < len(cells) else np.nan for cells in rows]
+            first += len(lines)
+        return settle(found)
+
     def _read(self, decimal: str) -> Array | None:
-        lines = self._lines
+        """All rows; each column in one piece, as it is wanted later."""
+        columns, first = None, 0
+        for lines in _blocks(self._lines):
+            block = self._parsed(lines, decimal)
+            if block is None or (columns is not None and block.shape[1] != columns.shape[0]):
+                return None
+            if columns is None:
+                columns = roomy(block.shape[1] * len(self)).reshape(block.shape[1], len(self))
+            columns[:, first : first + len(lines)] = block.T
+            first += len(lines)
+        if columns is None:
+            return None
+        release(columns)
+        return settle(columns).T
+
+    def _parsed(self, lines: Sequence[str], decimal: str, index: int | None = None) -> Array | None:
+        """Some lines, all of their columns or one; None where NumPy's parser cannot read them."""
         if decimal == COMMA:
             if self._delimiter == "," or any("." in line for line in lines):
                 return None
             lines = [line.replace(",", ".") for line in lines]
         delimiter = None if self._delimiter == SPACES else self._delimiter
-        if delimiter is not None and lines and lines[0].endswith(delimiter):
+        if delimiter is not None and lines[0].endswith(delimiter):
             lines = [line.removesuffix(delimiter) for line in lines]
+        if not any(lines):  # nothing but delimiters
+            return None
+        wanted: Any = {} if index is None else {"usecols": index}
         try:
-            found: Array = np.loadtxt(lines, delimiter=delimiter, comments=None, quotechar='"', ndmin=2)
+            found: Array = np.loadtxt(lines, delimiter=delimiter, comments=None, quotechar='"', ndmin=2, **wanted)
         except ValueError:
             return None
         return found if found.shape[0] == len(lines) else None
+
+    def _is_quoted(self, lines: Sequence[str]) -> bool:
+        """Whether there are signs that keep cells together, which the two ways to split lines need not see alike."""
+        signs = '"([' if self._delimiter == SPACES else '"'
+        return any(sign in line for line in lines for sign in signs)
 
     def holding(self, mark: str) -> Iterator[tuple[int, str]]:
         """Lines without the sign are not split."""
         # Only a quoted cell holds the delimiter.
         sign = '"' if mark == self._delimiter else mark
-        for line, number in zip(self._lines, self._numbers, strict=True):
+        for i, line in enumerate(self._lines):
             if sign in line:
-                yield from ((number, cell.strip()) for cell in split(line, self._delimiter) if mark in cell)
+                yield from ((self.number(i), cell.strip()) for cell in split(line, self._delimiter) if mark in cell)
+
+
+class _Split(Sequence[list[str]]):
+    """Lines, split where they are asked for: the cells of an hour at 1 kHz take 1 GB."""
+
+    def __init__(self, lines: Sequence[str], delimiter: str) -> None:
+        self._lines, self._delimiter = lines, delimiter
+
+    def __len__(self) -> int:
+        return len(self._lines)
+
+    @overload
+    def __getitem__(self, key: int) -> list[str]: ...
+    @overload
+    def __getitem__(self, key: slice) -> list[list[str]]: ...
+    def __getitem__(self, key: int | slice) -> list[str] | list[list[str]]:
+        if isinstance(key, slice):
+            return [split(line, self._delimiter) for line in self._lines[key]]
+        return split(self._lines[key], self._delimiter)
+
+    def __iter__(self) -> Iterator[list[str]]:
+        return (split(line, self._delimiter) for line in self._lines)
+
+
+def _blocks(lines: Iterable[str]) -> Iterator[list[str]]:
+    left = iter(lines)
+    while block := list(itertools.islice(left, _BLOCK)):
+        yield block
 
 
 class CellRows:
@@ -117,10 +190,15 @@ class CellRows:
     def matrix(self, decimal: str) -> Array | None:
         """None: cells may be of any kind."""
 
+    def column(self, index: int, decimal: str) -> Array:
+        """Cells that are numbers as such, and those whose text is one."""
+        rows = (row[index] if index < len(row) else np.nan for row in self.cells)
+        return np.array([number(cell.strip() if isinstance(cell, str) else cell, decimal) for cell in rows])
+
     def holding(self, mark: str) -> Iterator[tuple[int, str]]:
         """Numbers that are kept as such hold no sign."""
-        for row, number in zip(self.cells, self._numbers, strict=True):
-            yield from ((number, cell.strip()) for cell in row if isinstance(cell, str) and mark in cell)
+        for row, place in zip(self.cells, self._numbers, strict=True):
+            yield from ((int(place), cell.strip()) for cell in row if isinstance(cell, str) and mark in cell)
 
 
 def split(line: str, delimiter: str) -> list[str]:

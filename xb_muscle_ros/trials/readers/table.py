@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +20,6 @@ from xb_muscle_ros.trials.readers.cells import (
     is_blank,
     is_clock,
     is_grouped,
-    number,
     with_comma,
     with_point,
 )
@@ -28,6 +29,7 @@ from xb_muscle_ros.trials.trial import Array
 
 Places = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.int64]
+_Value = TypeVar("_Value", bound=np.generic)
 
 
 @dataclass(frozen=True)
@@ -94,13 +96,18 @@ class Table:
             f"{hint if 'did you mean' in hint else ''}"
         )
 
-    def texts(self, column: str) -> list[str]:
+    def texts(self, column: str) -> Iterator[str]:
         """Cells of a column without blanks around them.
 
         Raises:
             UserError: no such column.
         """
-        return [cell if isinstance(cell, str) else f"{cell:.12g}" for cell in self._cells(self.index(column))]
+        place = self.index(column)
+        return (_text(cells, place) for cells in self.rows.cells)
+
+    def text(self, column: str, row: int) -> str:
+        """One of them."""
+        return _text(self.rows.cells[row], self.index(column))
 
     def numbers(self, column: str) -> Array:
         """Values of a column, shape (rows,).
@@ -122,9 +129,8 @@ class Table:
         Raises:
             UserError: no such column, or a cell that is neither blank nor a finite number.
         """
-        values = self._values(self.index(column))
-        bad = ~np.isfinite(values)
-        blank = bad & np.isnan(values)
+        values = self.rows.column(self.index(column), self.decimal)
+        bad, blank = ~np.isfinite(values), np.isnan(values)
         if blank.any() and self.rows.matrix(self.decimal) is None:
             place, rows = self.index(column), self.rows.cells
             cells = [next(iter(rows[i][place:]), "" if ragged else None) for i in np.flatnonzero(blank)]
@@ -142,16 +148,15 @@ class Table:
         if self.has_clock(column):
             return self._clock(column, rows), True
         values, blank = self.samples(column, ragged=True)  # missing times are refused here
-        missing = np.zeros_like(blank)
-        missing[rows] = blank[rows]
-        if missing.any():
+        if taken(blank, rows).any():
+            missing = np.zeros_like(blank)
+            missing[rows] = blank[rows]
             self.refuse(column, missing)
-        return values[rows], False
+        return taken(values, rows), False
 
     def has_clock(self, column: str) -> bool:
         """Whether the first cell of a column is the time of a clock."""
-        place = self.index(column)
-        return self.rows.matrix(self.decimal) is None and is_clock(next(iter(self.rows.cells[0][place:]), ""))
+        return self.rows.matrix(self.decimal) is None and is_clock(self.text(column, 0))
 
     def refuse(self, column: str, bad: Places, allowed: str = "") -> None:
         """Refuse a column.
@@ -163,10 +168,9 @@ class Table:
         Raises:
             UserError: always, naming the first of them.
         """
-        texts = self.texts(column)
         first = int(np.argmax(bad))
         run = int(np.argmin(bad[first:])) or bad.size - first
-        text = texts[first]
+        text = self.text(column, first)
         more = f" (a run of {run} {self.rows.word}s)" if run > 1 else ""
         if int(bad.sum()) > run:
             more += f"; so do {int(bad.sum()) - run} further {self.rows.word}s"
@@ -184,32 +188,35 @@ class Table:
         raise UserError(f"{self.where}, {self.place(first)}, column '{column}' holds {found}{more}; {remedy}")
 
     def _clock(self, column: str, rows: Indices) -> Array:
-        everything = self._cells(self.index(column))
-        cells = [everything[row] for row in rows]
-        seconds = clock_seconds(cells)
+        asked = np.zeros(len(self.rows), bool)
+        asked[rows] = True
+        seconds = clock_seconds(itertools.compress(self.texts(column), asked))
         if seconds is not None:
             return seconds
-        wrong = next((row for row, cell in zip(rows.tolist(), cells, strict=True) if not is_clock(cell)), None)
+        wrong = next((row for row in rows.tolist() if not is_clock(self.text(column, row))), None)
         if wrong is None:
             raise UserError(
                 f"{self.where}, column '{column}': dates change and are not written as 2026-11-30; write them so, or "
                 "leave the column out and give the rate of the samples (--rate '1000 Hz')"
             )
-        found = f"'{everything[wrong]}'" if str(everything[wrong]) else "nothing"
+        text = self.text(column, wrong)
+        found = f"'{text}'" if text else "nothing"
         raise UserError(
             f"{self.where}, {self.place(wrong)}, column '{column}' holds {found}; needed is the time of a clock such "
-            f"as '{cells[0]}'; mend or remove the {self.rows.word}"
+            f"as '{self.text(column, int(rows[0]))}'; mend or remove the {self.rows.word}"
         )
 
-    def _cells(self, index: int) -> list[Cell]:
-        rows = [cells[index] if index < len(cells) else "" for cells in self.rows.cells]
-        return [cell.strip() if isinstance(cell, str) else cell for cell in rows]
 
-    def _values(self, index: int) -> Array:
-        matrix = self.rows.matrix(self.decimal)
-        if matrix is None:
-            return np.array([number(cell, self.decimal) for cell in self._cells(index)])
-        return matrix[:, index] if index < matrix.shape[1] else np.full(len(self.rows), np.nan)
+def _text(cells: Sequence[Cell], place: int) -> str:
+    cell = cells[place] if place < len(cells) else ""
+    return cell.strip() if isinstance(cell, str) else f"{cell:.12g}"
+
+
+def taken(values: npt.NDArray[_Value], rows: Indices) -> npt.NDArray[_Value]:
+    """Values of some rows, ascending; those of rows that follow each other are no copy."""
+    if rows.size and int(rows[-1]) - int(rows[0]) + 1 == rows.size:
+        return values[int(rows[0]) : int(rows[-1]) + 1]
+    return values[rows]
 
 
 def decimal_of(where: str, rows: Rows) -> tuple[str, str]:

@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from xb_muscle_ros.trials.inspecting.words import read_name
-from xb_muscle_ros.trials.readers.cells import COMMA, is_grouped, number
+from xb_muscle_ros.trials.readers.cells import COMMA, is_grouped
 from xb_muscle_ros.trials.readers.contents import Content, Contents
 from xb_muscle_ros.trials.readers.encoding import read_text
 from xb_muscle_ros.trials.readers.table import Table
+from xb_muscle_ros.trials.readers.text_lines import lines_of
+from xb_muscle_ros.trials.trial import Array
 
 _FACT = re.compile(r"#+\s*([A-Za-zµ][^:=]*?)\s*[:=]\s*(.+?)\s*")
 _MOST_TEXTS = 5
@@ -30,17 +32,12 @@ def table_contents(path: Path, tables: Iterator[Table]) -> Contents:
     for i, header in enumerate(table.header):
         # A name that is there twice goes by its number.
         name = header if header and table.header.count(header) == 1 else str(i + 1)
-        texts = table.texts(name)
-        if table.has_clock(name):
-            values = table.times(name, np.arange(len(rows)))[0]
-        else:
-            values = np.array([number(text, table.decimal) for text in texts])
-        if not np.isfinite(values).any() and any(texts):
-            others.append(_text_column(name, texts))
+        values = table.times(name, np.arange(len(rows)))[0] if table.has_clock(name) else rows.column(i, table.decimal)
+        if not np.isfinite(values).any() and any(table.texts(name)):
+            others.append(_text_column(name, list(dict.fromkeys(table.texts(name)))))
             continue
-        lines = [rows.number(row) for row in range(len(rows))]
         unit = table.units[i].strip("()[] ") if table.units and not read_name(name).unit else ""
-        columns.append(Content(name, values, unit, faults=tuple(_faults(texts, values, lines)), at=table.place))
+        columns.append(Content(name, values, unit, faults=tuple(_faults(table, name, values)), at=table.place))
     others += [f"{more.where} is a table as well; its signals are not shown" for more in tables]
     mark = "comma" if table.decimal == COMMA else "point"
     sheet = f"sheet '{table.sheet}', " if table.sheet else ""
@@ -49,23 +46,23 @@ def table_contents(path: Path, tables: Iterator[Table]) -> Contents:
     return Contents(form, tuple(columns), facts=facts, others=tuple(others), notes=table.notices)
 
 
-def _text_column(name: str, texts: list[str]) -> str:
+def _text_column(name: str, different: list[str]) -> str:
     """A column of words."""
-    different = list(dict.fromkeys(texts))
     shown = ", ".join(f"'{text}'" for text in different[:_MOST_TEXTS])
     more = ", ..." if len(different) > _MOST_TEXTS else ""
     return f"column '{name}' holds no numbers but {len(different)} texts: {shown}{more}"
 
 
-def _faults(texts: list[str], values: np.ndarray[tuple[int], np.dtype[np.float64]], lines: list[int]) -> Iterator[str]:
-    empty = [i for i, text in enumerate(texts) if not text]
-    strange = [i for i, text in enumerate(texts) if text and not np.isfinite(values[i])]
+def _faults(table: Table, name: str, values: Array) -> Iterator[str]:
+    texts = {row: table.text(name, row) for row in np.flatnonzero(~np.isfinite(values)).tolist()}
+    empty = [row for row, text in texts.items() if not text]
+    strange = [row for row, text in texts.items() if text]
     if empty:
-        yield f"{_cells(len(empty))} empty, the first in line {lines[empty[0]]}"
+        yield f"{_cells(len(empty))} empty, the first in line {table.rows.number(empty[0])}"
     if strange:
-        first = strange[0]
-        why = ", thousands separators" if is_grouped(texts[first]) else ""
-        yield f"{_cells(len(strange))} no finite number, the first '{texts[first]}' in line {lines[first]}{why}"
+        row, text = strange[0], texts[strange[0]]
+        why = ", thousands separators" if is_grouped(text) else ""
+        yield (f"{_cells(len(strange))} no finite number, the first '{text}' in line {table.rows.number(row)}{why}")
 
 
 def _cells(count: int) -> str:
@@ -74,7 +71,8 @@ def _cells(count: int) -> str:
 
 def _facts(path: Path) -> Iterator[tuple[str, str]]:
     """Names and values in lines of comment."""
-    for line in read_text(path)[0].splitlines():
-        match = _FACT.fullmatch(line) if line.startswith("#") else None
+    _, comments = lines_of(read_text(path).utf8, lambda line: True)
+    for line in comments:
+        match = _FACT.fullmatch(line)
         if match is not None:
             yield match.group(1), match.group(2)

@@ -18,7 +18,7 @@ from xb_muscle_ros.trials.readers.left_out import Told, is_left_out, told_by, wa
 from xb_muscle_ros.trials.readers.options import DEFAULTS, TableOptions, read_options, wanted
 from xb_muscle_ros.trials.readers.parts import Part, parts_of
 from xb_muscle_ros.trials.readers.pca_columns import check_pca
-from xb_muscle_ros.trials.readers.table import Table
+from xb_muscle_ros.trials.readers.table import Table, taken
 from xb_muscle_ros.trials.readers.table_contents import table_contents
 from xb_muscle_ros.trials.readers.tree import Keys
 from xb_muscle_ros.trials.readers.units import UNITS, unit_in
@@ -114,7 +114,7 @@ def _time(table: Table, mapping: ImportMapping, part: Part) -> tuple[Array, str]
     values, is_clock = table.times(column, part.rows)
     if not is_clock:
         return values, ""
-    first = table.texts(column)[int(part.rows[0])]
+    first = table.text(column, int(part.rows[0]))
     line = f"column '{column}' holds times of a clock; '{first}' is read as {values[0]:.9g} s"
     return values / mapping.time.unit.factor, line
 
@@ -126,7 +126,7 @@ def _values(table: Table, mapping: ImportMapping, part: Part, column: str, time:
         UserError: blanks that are too many, or at the begin or end.
     """
     values, blank = table.samples(column, part.ragged)
-    values, blank = values[part.rows], blank[part.rows]
+    values, blank = taken(values, part.rows), taken(blank, part.rows)
     if not blank.any():
         return values, ""
     told_s = mapping.table.longest_blank_s
