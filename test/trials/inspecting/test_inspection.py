@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.bags import read_trial, write_trial
 from xb_muscle_ros.trials.importing import Imported, import_recordings
-from xb_muscle_ros.trials.inspecting.figure import draw
+from xb_muscle_ros.trials.inspecting.figure import _drawn, draw
 from xb_muscle_ros.trials.inspecting.inspection import inspect_file, one_mapping
 from xb_muscle_ros.trials.inspecting.report import report, rows
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
@@ -251,3 +251,15 @@ def test_any_table_is_told_or_refused_on_one_line(tmp_path: Path, header: list[s
     assert isinstance(yaml.safe_load(found.proposal.text), dict)
     assert report(found)
     draw(tmp_path / "p.png", found)
+
+
+def test_of_a_long_signal_peaks_and_gaps_are_drawn() -> None:
+    values = np.zeros(100_000)
+    values[[31_111, 77_777]] = 1.0, -2.0
+    values[50_000:50_010] = np.nan
+    shown = values[_drawn(values)]
+    assert shown.size < 10_000
+    assert (np.nanmax(shown), np.nanmin(shown)) == (1.0, -2.0)
+    assert np.isnan(shown).any()
+    assert values[_drawn(values[:50])].size == values.size
+    assert np.isnan(values[50_000:50_010][_drawn(values[50_000:50_010])]).all()

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from xb_muscle_ros.trials.readers.contents import Content
 from xb_muscle_ros.trials.readers.parts import bounds_of_runs
 from xb_muscle_ros.trials.stamps import largest_gap, not_after, to_ns
 from xb_muscle_ros.trials.trial import Array
-
-Places = npt.NDArray[np.intp]
 
 # Steps that differ by more than this part of the median are told.
 _UNEVEN = 0.02
@@ -41,28 +38,32 @@ def clock_of(times_s: Array, content: Content) -> Clock:
         times_s: shape (n,), s, or any unit where that is not known; NaN where there is none.
         content: the signal that they are of, for its places.
     """
-    known = np.flatnonzero(np.isfinite(times_s))
-    if not known.size:
+    finite = np.isfinite(times_s)
+    if not finite.any():
         return Clock((0, 0), None, ("no time is a finite number",))
-    times = times_s[known]
+    whole = bool(finite.all())
+    known: Sequence[int] = range(times_s.size) if whole else np.flatnonzero(finite).tolist()
+    times = times_s if whole else times_s[finite]
     bounds = tuple(bounds_of_runs(times) or (0, times.size))
-    steps = np.diff(times)
-    forward = steps[steps > 0.0]
+    forward = np.diff(times)
+    if not np.all(forward > 0.0):
+        forward = forward[forward > 0.0]
     rate = 1.0 / float(np.median(forward)) if forward.size else None
+    del forward  # as large as the record
     faults = list(_faults(times, bounds, content, known))
     if len(bounds) > 2:
-        faults.insert(0, f"time starts anew {len(bounds) - 2} times, first at {content.at(int(known[bounds[1]]))}")
+        faults.insert(0, f"time starts anew {len(bounds) - 2} times, first at {content.at(known[bounds[1]])}")
     return Clock(bounds, rate, tuple(faults))
 
 
-def _faults(times: Array, bounds: tuple[int, ...], content: Content, known: Places) -> Iterator[str]:
+def _faults(times: Array, bounds: tuple[int, ...], content: Content, known: Sequence[int]) -> Iterator[str]:
     back: list[int] = []
     for begin, end in itertools.pairwise(bounds):
         back += (not_after(to_ns(times[begin:end] - times[begin])) + begin).tolist()
     if back:
         i = back[0]
         what = "stands still" if times[i] == times[i - 1] else "goes back or stands still"
-        where = content.at(int(known[i]))
+        where = content.at(known[i])
         yield f"time {what} {len(back)} times, first at {where} ({times[i - 1]:.9g}, then {times[i]:.9g})"
         return
     uneven = gaps = 0

@@ -7,14 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from xb_muscle_ros.plotting.style import DATA, MODEL, SHADE, figure, save
+from xb_muscle_ros.plotting.thinned import thinned
 from xb_muscle_ros.trials.inspecting.clocks import clock_of
 from xb_muscle_ros.trials.inspecting.inspection import Inspection
 from xb_muscle_ros.trials.inspecting.report import times_of_signal
 from xb_muscle_ros.trials.phases import detect_phases
 from xb_muscle_ros.trials.readers.contents import Content
-from xb_muscle_ros.trials.trial import Phase
+from xb_muscle_ros.trials.trial import Array, Phase
 
 MOST_SIGNALS = 10
 _UNITS = {"uM": "µM", "um": "µm", "L0": "$L_0$", "%L0": "% $L_0$", "F0": "$F_0$", "%F0": "% $F_0$", "us": "µs"}
@@ -78,14 +80,29 @@ def _panel(axes: Any, made: Inspection, content: Content) -> bool:
     for i in range(len(bounds) - 1):
         part = slice(bounds[i], bounds[i + 1])
         drawn = "steps-post" if holds else "default"
-        axes.plot(times[part], content.values[part], drawstyle=drawn, marker="." if times.size < 3 else None, **look)
+        shown = _drawn(content.values[part])
+        axes.plot(
+            times[part][shown], content.values[part][shown], drawstyle=drawn,
+            marker="." if times.size < 3 else None, **look,
+        )  # fmt: skip
     unit = made.recognition.units[content.label]
     what = made.recognition.taken_for.get(content.label, "").partition(": ")[0] if role is None else ""
     axes.set_title(_escaped(f"{content.label}: {what}" if what else content.label), loc="left", pad=2)
-    shown = _UNITS.get(unit, _escaped(unit)) or "unit ?"
-    axes.set_ylabel(shown if role is None else f"{role.role.capitalize()} ({shown})")
+    written = _UNITS.get(unit, _escaped(unit)) or "unit ?"
+    axes.set_ylabel(written if role is None else f"{role.role.capitalize()} ({written})")
     axes.margins(x=0.01)
     return in_s
+
+
+def _drawn(values: Array) -> slice | npt.NDArray[np.intp]:
+    """Which samples of a signal to draw: all, or of a long one those that show, and where each gap begins."""
+    known = np.isfinite(values)
+    if not known.any():
+        return slice(None)
+    shown = thinned(np.arange(float(values.size)), np.where(known, values, values[np.argmax(known)]))
+    if isinstance(shown, slice):
+        return shown
+    return np.union1d(shown, np.flatnonzero(known[:-1] & ~known[1:]) + 1)
 
 
 def _escaped(text: str) -> str:
