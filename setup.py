@@ -97,6 +97,7 @@ setup(
             "colcon-bash",
             "colcon-output",
             "colcon-library-path",
+            "xlwt",
         ],
     },
     entry_points={

@@ -91,3 +91,8 @@ def test_whatever_is_known_the_file_loads(
     )  # fmt: skip
     fibre = xb.load_fibre(file)
     assert (fibre.f0_n, fibre.reference_length_m) == (f0_n, length_m)
+
+
+def test_amounts_are_the_numbers_that_were_written(tmp_path: Path) -> None:
+    file = xb.new_fibre("mine", tmp_path, length="1.05 mm", f0="0.55mN", tell=lambda line: None)
+    assert (xb.load_fibre(file).reference_length_m, xb.load_fibre(file).f0_n) == (0.00105, 0.00055)

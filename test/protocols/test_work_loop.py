@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -90,3 +92,18 @@ def test_what_does_not_repeat_or_move_is_a_note() -> None:
 def test_a_peak_above_the_ceiling_is_refused() -> None:
     with pytest.raises(UserError, match="ceiling"):
         xb.run_protocol("work-loop", FIBRE, peak_pca=4.5)
+
+
+def test_every_cycle_has_its_row(tmp_path: Path) -> None:
+    made = xb.run_protocol("work-loop", FIBRE, frequency=[1.0, 2.0], cycles=3, stress=100.0, tell=lambda line: None)
+    (found,) = made.results
+    assert [part["cycle"] for part in found.parts] == [1, 2, 3, 1, 2, 3]
+    for row, last in zip(found.rows, found.parts[2::3], strict=True):
+        assert {key: row[key] for key in last if key in row} == {key: last[key] for key in last if key in row}
+    assert found.rows[0]["first_net_f0_l0"] == found.parts[0]["net_f0_l0"]
+    made.save(tmp_path)
+    lines = (tmp_path / "work_loop_cycles.csv").read_text().splitlines()
+    assert len(lines) == 7
+    assert lines[0].startswith("fibre,of,trial,cycle,start_s,end_s,net_f0_l0,")
+    tree = json.loads((tmp_path / "work_loop.json").read_text())
+    assert [cycle["end_s"] for cycle in tree["found"][0]["cycles"][:3]] == pytest.approx([1.1, 2.1, 3.1])

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
+from scipy.linalg import matmul_toeplitz, toeplitz
 from scipy.signal import lfilter
 
 from xb_muscle_ros.evaluate.trials import _mean_in_cells
@@ -107,6 +109,70 @@ def test_srs_in_hum(speed: float, hum_hz: float) -> None:
 )
 def test_isometric_force(setting: Setting) -> None:
     assert_covers(list(errors("isometric_f0", LEVEL, setting)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("memory_s", [0.0, 2e-3, 0.02])
+@pytest.mark.parametrize("step_s", [2e-4, 5e-5])
+def test_srs_sampled_fast(step_s: float, memory_s: float) -> None:
+    """Errors at 20 kHz were 30 to 300 times too large in white noise, and a third in noise that fades within 20 ms."""
+    memory = float(np.exp(-step_s / memory_s)) if memory_s else 0.0
+    off = list(errors("srs_test", SRS, Setting(lead_s=1.0, speed=2.0, step_s=step_s, memory=memory), 40))
+    assert_covers(off)
+
+
+def true_error(weights: Array, memory: float, white_share: float = 0.0) -> float:
+    """Of a weighted sum of samples, with noise of SD 1e-3 F0."""
+    gamma = (1.0 - white_share) * memory ** np.arange(weights.size)
+    gamma[0] += white_share
+    return 1e-3 * float(np.sqrt(weights @ matmul_toeplitz(gamma, weights)))
+
+
+@pytest.mark.parametrize("memory_s", [0.0, 2e-3, 0.02])
+@pytest.mark.parametrize("step_s", [1e-3, 4e-4, 2e-4, 5e-5])
+def test_errors_of_means_and_slopes_at_any_rate(step_s: float, memory_s: float) -> None:
+    memory = float(np.exp(-step_s / memory_s)) if memory_s else 0.0
+    setting = Setting(lead_s=1.0, step_s=step_s, memory=memory)
+    known = [force_noise(trial(np.random.default_rng(seed), setting)) for seed in range(5)]
+    for span_s in (0.005, 0.05, 0.2):
+        time_s = np.arange(round(span_s / step_s)) * step_s
+        from_middle = time_s - time_s.mean()
+        for weights in (np.full(time_s.size, 1.0 / time_s.size), from_middle / (from_middle @ from_middle)):
+            ratios = [each.of_sum(weights, time_s) / true_error(weights, memory) for each in known if each]
+            assert len(ratios) == 5
+            assert np.median(ratios) == pytest.approx(1.0, abs=0.12 if memory_s < 0.01 else 0.4)
+
+
+def test_white_and_slow_noise_together_sampled_fast() -> None:
+    """Six samples at 5 kHz do not show slow noise under as much white noise; means of a millisecond do."""
+    time_s, ratios = np.arange(1000) * 2e-4, []
+    for seed in range(12):
+        random, memory = np.random.default_rng(seed), float(np.exp(-2e-4 / 0.02))
+        one = trial(random, Setting(lead_s=1.0, step_s=2e-4, memory=memory, sd=np.sqrt(0.5) * 1e-3))
+        white = np.sqrt(0.5) * 1e-3 * random.standard_normal(one.force_n.size)
+        known = force_noise(replace(one, force_n=one.force_n + white))
+        assert known is not None
+        mean = np.full(time_s.size, 1.0 / time_s.size)
+        ratios.append(known.of_sum(mean, time_s) / true_error(mean, memory, 0.5))
+    assert np.median(ratios) == pytest.approx(1.1, abs=0.35)
+
+
+def test_hum_sampled_fast_is_found() -> None:
+    known = force_noise(trial(np.random.default_rng(3), Setting(lead_s=1.0, step_s=5e-5, memory=0.0, hum=5e-3)))
+    assert known is not None
+    assert known._lines[0].frequency_hz == pytest.approx(50.0, abs=0.1)
+    assert known._lines[0].power_f0 > 100.0 * sum(line.power_f0 for line in known._lines[1:])
+
+
+def test_autocovariance_of_two_rates_is_one_of_noise() -> None:
+    """No weighted sum has a variance below zero, and that of a sample is the noise's."""
+    memory = float(np.exp(-5e-5 / 0.02))
+    one = trial(np.random.default_rng(0), Setting(lead_s=1.0, step_s=5e-5, memory=memory))
+    known = force_noise(one)
+    assert known is not None
+    gamma = known.autocovariance(one.time_s[:4000])
+    assert np.sqrt(gamma[0]) == pytest.approx(1e-3, rel=0.5)
+    assert np.linalg.eigvalsh(toeplitz(gamma[::4][:500])).min() > -1e-9 * gamma[0]
 
 
 def test_srs_sampled_every_6_ms_has_no_value() -> None:

@@ -92,7 +92,8 @@ def _amount(
         found = quantity(f"{match.group(1)} {match.group(2)}" if match else given, kind, "value", option, example)
         if found.kind != kind:
             raise UserError(f"{option} is '{given}'; needed is a {kind}, for example '{example}'")
-        value = found.value
+        # 1.05 mm is 0.00105 m, and not the next number.
+        value = float(f"{found.value:.15g}")
     else:
         value = float(given)
     low, high = allowed
@@ -109,7 +110,7 @@ def _area(given: str | float | None) -> float | None:
         match = _NUMBER_AND_UNIT.fullmatch(given)
         unit = "" if match is None else re.sub("[µμ]", "u", match.group(2)).replace("²", "2").replace("^", "")
         try:
-            value = float(match.group(1)) * _AREAS_M2[unit] if match else math.nan
+            value = float(f"{float(match.group(1)) * _AREAS_M2[unit]:.15g}") if match else math.nan
         except (KeyError, ValueError):
             value = math.nan
     else:

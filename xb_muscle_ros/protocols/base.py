@@ -151,6 +151,7 @@ class Found:
         curves: fitted curves, for the figure.
         runs: what it was read off.
         notes: what is missing, and what was taken for granted, one line each.
+        parts: a table of the parts of trials; keys are those of `Protocol.part_columns`.
         numbers_at: where each of several conditions gives numbers of its own, those by the condition's name, for
             example ``pCa 6.1``; `numbers` are then those of the first.
     """
@@ -163,6 +164,7 @@ class Found:
     runs: tuple[Run, ...] = ()
     notes: tuple[str, ...] = ()
     numbers_at: Mapping[str, Mapping[str, Number]] = field(default_factory=dict)
+    parts: tuple[Mapping[str, Cell], ...] = ()
 
     def column(self, key: str) -> Array:
         """Numbers of a column, NaN where there is none, shape (rows,)."""
@@ -186,6 +188,8 @@ class Protocol(abc.ABC):
         options: what it may be given.
         columns: of its table: key with unit -> how it is shown.
         numbers: what the whole table gives: key with unit -> how it is shown.
+        part: what several of make a trial, for a table of all of them (``cycle``); empty for no such table.
+        part_columns: of that table.
         source: a reference to the method.
     """
 
@@ -194,6 +198,8 @@ class Protocol(abc.ABC):
     options: tuple[Option, ...]
     columns: Mapping[str, Column]
     numbers: Mapping[str, Column] = MappingProxyType({})
+    part: str = ""
+    part_columns: Mapping[str, Column] = MappingProxyType({})
     source: str = ""
 
     @abc.abstractmethod

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,9 @@ def stem(protocol: Protocol) -> str:
 
 def older_results(folder: Path, protocol: Protocol) -> list[Path]:
     """What an older run of the protocol left in a folder, its bags aside."""
-    return matching(folder, rf"{stem(protocol)}\.(json|md|csv)", rf"{stem(protocol)}(_.+)?\.(png|pdf)")
+    return matching(
+        folder, rf"{stem(protocol)}(\.(json|md|csv)|_{protocol.part}s\.csv)", rf"{stem(protocol)}(_.+)?\.(png|pdf)"
+    )
 
 
 def tree(protocol: Protocol, found: Sequence[Found]) -> dict[str, Any]:
@@ -40,6 +42,7 @@ def tree(protocol: Protocol, found: Sequence[Found]) -> dict[str, Any]:
                 "numbers": _numbers(protocol, each.numbers),
                 **_at_conditions(protocol, each),
                 "rows": [{key: _plain(row.get(key)) for key in protocol.columns} for row in each.rows],
+                **_parts(protocol, each),
                 "notes": list(each.notes),
             }
             for each in found
@@ -49,18 +52,24 @@ def tree(protocol: Protocol, found: Sequence[Found]) -> dict[str, Any]:
 
 def rows(protocol: Protocol, found: Sequence[Found]) -> list[dict[str, Any]]:
     """The table as records: a standard error has a column of its own, ``<key>_se``."""
+    return _records([(each, each.rows) for each in found], protocol.columns)
+
+
+def _records(
+    tables: Sequence[tuple[Found, Sequence[Mapping[str, Cell]]]], columns: Iterable[str]
+) -> list[dict[str, Any]]:
     with_se = {
         key
-        for each in found
-        for row in each.rows
+        for _, lines in tables
+        for row in lines
         for key, cell in row.items()
         if isinstance(cell, Estimate) and cell.se
     }
     made = []
-    for each in found:
-        for row in each.rows:
+    for each, lines in tables:
+        for row in lines:
             record: dict[str, Any] = {"fibre": each.fibre, "of": each.of}
-            for key in protocol.columns:
+            for key in columns:
                 cell = row.get(key)
                 record[key] = cell.value if isinstance(cell, Estimate) else cell
                 if key in with_se:
@@ -115,6 +124,10 @@ def write(folder: Path, protocol: Protocol, found: Sequence[Found]) -> list[Path
     columns = ["fibre", "of", *protocol.columns]
     write_csv(base.with_suffix(".csv"), rows(protocol, found), columns)
     written = [base.with_suffix(suffix) for suffix in (".json", ".md", ".csv")]
+    if protocol.part:
+        written.append(folder / f"{stem(protocol)}_{protocol.part}s.csv")
+        parts = _records([(each, each.parts) for each in found], protocol.part_columns)
+        write_csv(written[-1], parts, ["fibre", "of", *protocol.part_columns])
     return [*written, *draw(folder, protocol, found)]
 
 
@@ -143,6 +156,13 @@ def _at_conditions(protocol: Protocol, found: Found) -> dict[str, Any]:
     if not found.numbers_at:
         return {}
     return {"numbers_at": {at: _numbers(protocol, numbers) for at, numbers in found.numbers_at.items()}}
+
+
+def _parts(protocol: Protocol, found: Found) -> dict[str, Any]:
+    """``cycles``, for a protocol whose trials are made of them."""
+    if not protocol.part:
+        return {}
+    return {f"{protocol.part}s": [{key: _plain(row.get(key)) for key in protocol.part_columns} for row in found.parts]}
 
 
 def _plain(cell: Cell) -> Any:

@@ -37,6 +37,15 @@ CYCLES = "cycles"
 _LEAD_S = 0.1
 # Net work may differ by this share of the work turned over where loops repeat.
 _SAME = 0.01
+_OF_CYCLE: Mapping[str, Column] = {
+    "net_f0_l0": Column("net work", "10⁻³ F0·L0", ".3f", 1e3),
+    "shortening_f0_l0": Column("shortening work", "10⁻³ F0·L0", ".3f", 1e3),
+    "lengthening_f0_l0": Column("lengthening work", "10⁻³ F0·L0", ".3f", 1e3),
+    "power_f0_l0_per_s": Column("power", "10⁻³ F0·L0/s", ".3f", 1e3),
+    "power_w_per_l": Column("power", "W/L", ".3g"),
+    "peak_f0": Column("peak force", "F0", ".3f"),
+    "mean_f0": Column("mean force", "F0", ".3f"),
+}
 
 
 class WorkLoops(Protocol):
@@ -67,18 +76,20 @@ class WorkLoops(Protocol):
         "duty": Column("duty", "", "g"),
         "cycles": Column("cycles", "", ".0f"),
         "repeats_from": Column("repeats from cycle", "", ".0f"),
-        "net_f0_l0": Column("net work", "10⁻³ F0·L0", ".3f", 1e3),
-        "shortening_f0_l0": Column("shortening work", "10⁻³ F0·L0", ".3f", 1e3),
-        "lengthening_f0_l0": Column("lengthening work", "10⁻³ F0·L0", ".3f", 1e3),
-        "power_f0_l0_per_s": Column("power", "10⁻³ F0·L0/s", ".3f", 1e3),
-        "power_w_per_l": Column("power", "W/L", ".3g"),
-        "peak_f0": Column("peak force", "F0", ".3f"),
-        "mean_f0": Column("mean force", "F0", ".3f"),
+        **_OF_CYCLE,
         "first_net_f0_l0": Column("net work, first cycle", "10⁻³ F0·L0", ".3f", 1e3),
     }
     numbers: Mapping[str, Column] = {
         "power_f0_l0_per_s": Column("largest power", "10⁻³ F0·L0/s", ".3f", 1e3),
         "frequency_hz": Column("at frequency", "Hz", ".4g"),
+    }
+    part = "cycle"
+    part_columns: Mapping[str, Column] = {
+        "trial": Column("trial"),
+        "cycle": Column("cycle", "", ".0f"),
+        "start_s": Column("begin", "s", ".4g"),
+        "end_s": Column("end", "s", ".4g"),
+        **_OF_CYCLE,
     }
     source = "Josephson 1985, J Exp Biol 114: 493-512"
 
@@ -126,8 +137,9 @@ class WorkLoops(Protocol):
         return made
 
     def analyse(self, fibre: str, of: str, runs: Sequence[Run]) -> Found:
-        """Work of every cycle; the table has that of the last of each trial."""
+        """Work of every cycle; the table of trials has that of the last of each."""
         rows: list[Mapping[str, Cell]] = []
+        parts: list[Mapping[str, Cell]] = []
         notes: list[str] = []
         curves: dict[str, Curve] = {}
         unknown = 0
@@ -141,6 +153,12 @@ class WorkLoops(Protocol):
                     for begin, end in itertools.pairwise(edges)
                 ]
                 rows.append({"trial": name, **_row(run, edges, works)})
+                parts += [
+                    {"trial": name, "cycle": k, "start_s": begin, "end_s": end, **_of_cycle(run, end - begin, work)}
+                    for k, ((begin, end), work) in enumerate(
+                        zip(itertools.pairwise(edges.tolist()), works, strict=True), 1
+                    )
+                ]
                 unknown += run.noise is None
                 curves[f"net work {len(rows)}"] = Curve(
                     np.arange(1.0, len(works) + 1.0), np.array([work.net.value for work in works], dtype=float)
@@ -150,7 +168,7 @@ class WorkLoops(Protocol):
                 notes += [f"trial {name}: {line}" for line in _remarks(works)]
         if of == MEASURED and unknown:
             notes.append(f"{NO_NOISE_KNOWN} ({unknown} of {len(rows)})")
-        return Found(fibre, of, tuple(rows), _numbers(rows), curves, tuple(runs), tuple(notes))
+        return Found(fibre, of, tuple(rows), _numbers(rows), curves, tuple(runs), tuple(notes), parts=tuple(parts))
 
     def size_mm(self, found: Sequence[Found]) -> tuple[float, float]:
         """Wide enough for three panels."""
@@ -210,26 +228,30 @@ def _frequency(edges: Array) -> float:
 
 
 def _row(run: Run, edges: Array, works: list[Work]) -> Mapping[str, Cell]:
-    last, stress = works[-1], run.setting("stress_kpa") or None
-    per_s = 1.0 / float(edges[-1] - edges[-2])
-    power = _times(last.net, per_s)
     return {
         "pca": run.trial.facts.pca,
         "frequency_hz": _frequency(edges),
-        "amplitude_l0": 0.5 * last.excursion_l0,
+        "amplitude_l0": 0.5 * works[-1].excursion_l0,
         "phase": run.setting("phase"),
         "duty": run.setting("duty"),
         "cycles": float(len(works)),
         "repeats_from": repeats_from(works, _SAME),
-        "net_f0_l0": last.net,
-        "shortening_f0_l0": last.shortening,
-        "lengthening_f0_l0": last.lengthening,
+        **_of_cycle(run, float(edges[-1] - edges[-2]), works[-1]),
+        "first_net_f0_l0": works[0].net,
+    }
+
+
+def _of_cycle(run: Run, duration_s: float, work: Work) -> Mapping[str, Cell]:
+    stress, power = run.setting("stress_kpa") or None, _times(work.net, 1.0 / duration_s)
+    return {
+        "net_f0_l0": work.net,
+        "shortening_f0_l0": work.shortening,
+        "lengthening_f0_l0": work.lengthening,
         "power_f0_l0_per_s": power,
         # 1 kPa is 1 kJ/m³, that is 1 J/L.
         "power_w_per_l": None if stress is None else _times(power, stress),
-        "peak_f0": last.peak_f0,
-        "mean_f0": last.mean_f0,
-        "first_net_f0_l0": works[0].net,
+        "peak_f0": work.peak_f0,
+        "mean_f0": work.mean_f0,
     }
 
 

@@ -147,7 +147,7 @@ def redevelopment(
     lines, rest = hum(step_s, residual)
     curve, _ = np.linalg.qr(_slopes(since, *found))
     beside = by_curves({"": [Piece(t, rest, curve)]}, {"": evenly_sampled(t)})
-    se = ForceNoise(beside[""], step_s, lines).of_sum(weights, t)
+    se = ForceNoise.of_models(beside[""], step_s, lines).of_sum(weights, t)
     if noise is not None:
         se = max(se, noise.of_sum(weights, t))
     return Redevelopment(

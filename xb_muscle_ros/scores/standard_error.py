@@ -9,7 +9,7 @@ trial, and lengths and times to be without error.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.linalg import matmul_toeplitz
@@ -19,7 +19,8 @@ from xb_muscle_ros.scores.estimate import rounded
 from xb_muscle_ros.scores.noise.model import Source, TrialNoise
 from xb_muscle_ros.scores.noise.pieces import evenly_sampled
 from xb_muscle_ros.scores.noise.trials import ENOUGH, by_windows, noise_of, steady_scatter_f0
-from xb_muscle_ros.scores.noise.windows import LEAST, isometric_window
+from xb_muscle_ros.scores.noise.two_rates import certain, in_a_mean, two_rates
+from xb_muscle_ros.scores.noise.windows import LEAST, MOST, isometric_window
 from xb_muscle_ros.trials.hum import Line, hum
 from xb_muscle_ros.trials.trial import Array, Trial
 
@@ -27,23 +28,31 @@ from xb_muscle_ros.trials.trial import Array, Trial
 class ForceNoise:
     """Noise of one trial's measured force."""
 
-    def __init__(self, noise: TrialNoise, step_s: float, lines: Sequence[Line] = ()) -> None:
+    def __init__(self, autocovariance: Callable[[Array], Array], step_s: float, lines: Sequence[Line] = ()) -> None:
         """Noise as it is known.
 
         Args:
-            noise: of the trial, hum of the mains aside.
-            step_s: usual time between its samples, s.
+            autocovariance: of the noise, hum aside: at lags in s, ascending, F0², shape (n,).
+            step_s: usual time between samples, s.
             lines: the hum.
         """
-        self._noise, self._step_s, self._lines = noise, step_s, tuple(lines)
+        self._autocovariance, self._step_s, self._lines = autocovariance, step_s, tuple(lines)
+
+    @classmethod
+    def of_models(cls, noise: TrialNoise, step_s: float, lines: Sequence[Line] = ()) -> ForceNoise:
+        """By the mean over models of a trial's noise, hum aside."""
+
+        def autocovariance(lags_s: Array) -> Array:
+            found: Array = certain(noise) * np.mean([each.at_lags(lags_s, step_s) for each in noise.members], axis=0)
+            return found
+
+        return cls(autocovariance, step_s, lines)
 
     def autocovariance(self, time_s: Array) -> Array:
         """At lags of 0, 1, ... of the mean steps between these times, F0², shape (n,)."""
         n = time_s.size
         lags_s = np.arange(n) * (float(time_s[-1] - time_s[0]) / (n - 1) if n > 1 else self._step_s)
-        total: Array = np.mean([m.at_lags(lags_s, self._step_s) for m in self._noise.members], axis=0)
-        # The size of each model is an estimate of so many degrees of freedom.
-        total *= self._noise.freedom / max(self._noise.freedom - 2.0, 1.0)
+        total = self._autocovariance(lags_s)
         for line in self._lines:
             total += line.autocovariance(lags_s)
         return total
@@ -73,12 +82,15 @@ def force_noise(trial: Trial) -> ForceNoise | None:
         return None
     name, step_s = trial.facts.trial, float(np.median(np.diff(trial.force_time_s)))
     if evenly_sampled(trial.force_time_s):
-        window = isometric_window(trial)
+        window = isometric_window(trial, in_a_mean(step_s) * MOST)
+        fast = two_rates(window)
+        if fast is not None:
+            return ForceNoise(fast.autocovariance, step_s, fast.lines)
         if window.force_f0.size >= LEAST:
             # In fewer samples a line is no sharper than an autoregression.
             enough = window.force_f0.size >= ENOUGH
             lines, rest = hum(window.step_s, window.force_f0) if enough else ((), window.force_f0)
-            return ForceNoise(by_windows([window._replace(force_f0=rest)])[name], step_s, lines)
+            return ForceNoise.of_models(by_windows([window._replace(force_f0=rest)])[name], step_s, lines)
     try:
         noise = noise_of([trial]).trials[0]
     except UserError:
@@ -86,8 +98,8 @@ def force_noise(trial: Trial) -> ForceNoise | None:
     # Differences of neighbours show fast noise alone, and so do few samples, unless some of them are of steady force;
     # an estimate's error depends on the slow.
     few = noise.samples < LEAST and steady_scatter_f0(trial) == 0.0
-    fast = noise.source is Source.DIFFERENCES or few
-    return None if fast else ForceNoise(noise, step_s)
+    unfit = noise.source is Source.DIFFERENCES or few
+    return None if unfit else ForceNoise.of_models(noise, step_s)
 
 
 NO_NOISE_KNOWN = "standard error not known: no quiet time to take the noise from"

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from xb_muscle_ros.scores.noise.model import NoiseModel
+from xb_muscle_ros.scores.noise.trials import by_windows
 from xb_muscle_ros.scores.noise.windows import Window
 from xb_muscle_ros.simulation.made import coloured_noise
 
@@ -80,3 +81,12 @@ def test_any_window_gives_finite_draws(model_of: ModelOf, n: int, seed: int, mem
     assert drawn.shape == (60, 30)
     assert np.all(np.isfinite(drawn))
     assert 1e-5 <= model.trials[0].sd_f0 < 50.0 * sd + 2e-5
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_white_noise_sampled_fast_is_found_white(seed: int) -> None:
+    """The search ended in a hollow of persistent noise in two of five records: slow noise forty times too large."""
+    force = 1e-3 * np.random.default_rng(seed).standard_normal(1000)
+    noise = by_windows([Window("t", 5e-5, force)])["t"]
+    of_mean = np.sqrt(noise.likeliest.variance_of_mean(5e-5 * np.arange(1000)))
+    assert of_mean == pytest.approx(1e-3, rel=0.25)

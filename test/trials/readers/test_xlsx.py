@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Sequence
+import zipfile
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 openpyxl = pytest.importorskip("openpyxl", reason="needs openpyxl")
+xlwt = pytest.importorskip("xlwt", reason="needs xlwt")
 pytest.importorskip("python_calamine", reason="needs the extra files")
 
 ROWS = [list(row) for row in zip(lab.TIME_S.tolist(), lab.LENGTH_MM.tolist(), lab.FORCE_MN.tolist(), strict=True)]
@@ -127,3 +129,87 @@ def test_what_is_no_workbook_is_refused_or_read_as_what_it_is(tmp_path: Path) ->
     lab.same(lab.trials(path)[0])
     assert np.isclose(lab.trials(path, trial="again")[0].facts.pca, 6.1)
     assert "no sheet holds the table" in lab.refusal(book(tmp_path / "c", a=[["x"], ["y"]], b=[["z"]]))
+
+
+def _xls(path: Path, rows: Sequence[Sequence[Any]]) -> None:
+    """A workbook of Excel 97."""
+    made = xlwt.Workbook()
+    sheet = made.add_sheet("run 1")
+    day = xlwt.easyxf(num_format_str="yyyy-mm-dd hh:mm:ss.000")
+    for i, row in enumerate(rows):
+        for j, cell in enumerate(row):
+            if isinstance(cell, datetime.datetime):  # xlwt itself drops parts of a second
+                sheet.write(i, j, (cell - datetime.datetime(1899, 12, 30)) / datetime.timedelta(days=1), day)
+            elif cell != "":
+                sheet.write(i, j, cell)
+    made.save(str(path))
+
+
+def _ods(path: Path, rows: Sequence[Sequence[Any]]) -> None:
+    """A spreadsheet as OpenDocument 1.2 describes it."""
+    cells = {
+        float: lambda v: f'<table:table-cell office:value-type="float" office:value="{v!r}"/>',
+        str: lambda v: f'<table:table-cell office:value-type="string"><text:p>{v}</text:p></table:table-cell>',
+        datetime.datetime: lambda v: (
+            f'<table:table-cell office:value-type="date" office:date-value="{v.isoformat()}"/>'
+        ),
+    }
+    lines = "".join(
+        "<table:table-row>"
+        + "".join(cells[type(cell)](cell) if cell != "" else "<table:table-cell/>" for cell in row)
+        + "</table:table-row>"
+        for row in rows
+    )
+    names = " ".join(
+        f'xmlns:{name}="urn:oasis:names:tc:opendocument:xmlns:{name}:1.0"' for name in ("office", "table", "text")
+    )
+    content = (
+        f'<?xml version="1.0" encoding="UTF-8"?><office:document-content {names} office:version="1.2"><office:body>'
+        f'<office:spreadsheet><table:table table:name="run 1">{lines}</table:table></office:spreadsheet>'
+        "</office:body></office:document-content>"
+    )
+    kind = "application/vnd.oasis.opendocument.spreadsheet"
+    manifest = (
+        '<?xml version="1.0" encoding="UTF-8"?><manifest:manifest '
+        'xmlns:manifest="urn:oasis:names:tc:opendocument:xmlns:manifest:1.0" manifest:version="1.2">'
+        f'<manifest:file-entry manifest:full-path="/" manifest:media-type="{kind}"/>'
+        '<manifest:file-entry manifest:full-path="content.xml" manifest:media-type="text/xml"/></manifest:manifest>'
+    )
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("mimetype", kind)
+        file.writestr("content.xml", content)
+        file.writestr("META-INF/manifest.xml", manifest)
+
+
+WRITERS = [pytest.param(_xls, ".xls", id="xls"), pytest.param(_ods, ".ods", id="ods")]
+
+
+@pytest.mark.parametrize(("write", "suffix"), WRITERS)
+def test_older_and_open_workbooks_keep_their_bits(write: Callable[..., None], suffix: str, tmp_path: Path) -> None:
+    write(tmp_path / f"t{suffix}", [["rig 3"], lab.NAMES, *ROWS])
+    (trial,) = lab.trials(tmp_path / f"t{suffix}")
+    lab.same(trial)
+    assert (trial.force_n / 1e-3).tolist() == (1e-3 * lab.FORCE_MN / 1e-3).tolist()
+    assert "row 2 names the columns" in lab.told(trial)
+
+
+@pytest.mark.parametrize(("write", "suffix"), WRITERS)
+def test_blanks_and_times_of_older_and_open_workbooks(write: Callable[..., None], suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"t{suffix}"
+    begin = datetime.datetime(2026, 11, 30, 9, 30)
+    rows = [[begin + datetime.timedelta(milliseconds=10 * i), length, f] for i, (_, length, f) in enumerate(ROWS)]
+    rows[5][2] = ""
+    write(path, [lab.NAMES, *rows])
+    (trial,) = lab.trials(path, blanks={"longest": "20 ms"})
+    assert np.allclose(np.diff(trial.time_s), 0.01, rtol=0.0, atol=1e-6)
+    assert "1 blank sample was filled" in lab.told(trial)
+    assert "holds times of a clock" in lab.told(trial)
+
+
+@pytest.mark.parametrize("suffix", [".xls", ".ods", ".xlsb"])
+def test_what_is_called_a_workbook_and_is_none(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"t{suffix}"
+    path.write_bytes(b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + bytes(600))
+    why = lab.refusal(path)
+    assert str(path) in why
+    assert "\n" not in why

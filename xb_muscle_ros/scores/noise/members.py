@@ -52,6 +52,18 @@ class Regression(NamedTuple):
         beyond, _ = lfilter([1.0], recursion, np.zeros(lags - known.size), zi=lfiltic([1.0], recursion, known[:0:-1]))
         return np.concatenate([known, beyond])
 
+    def spectrum(self, frequency_hz: Array, step_s: float) -> Array:
+        """Density at both signs of frequency, F0²/Hz, shape (n,); its integral to half the rate either way is `sd_f0`².
+
+        Args:
+            frequency_hz: shape (n,), Hz.
+            step_s: between samples, s.
+        """
+        lags = np.arange(1, self.weights.size + 1)
+        response = 1.0 - np.exp(-2j * np.pi * step_s * np.outer(frequency_hz, lags)) @ self.weights
+        found: Array = self.innovation_sd_f0**2 * step_s / np.abs(response) ** 2
+        return found
+
     def at_lags(self, lags_s: Array, step_s: float) -> Array:
         """See `model.Member`."""
         lags = lags_s / step_s

@@ -30,10 +30,13 @@ class Window(NamedTuple):
     force_f0: Array
 
 
-def isometric_window(trial: Trial) -> Window:
+def isometric_window(trial: Trial, most: int = MOST) -> Window:
     """The steady force of a trial before its first length change, or where it has none, late in its longest pause.
 
     A pause is a recovery or hold, late its last third, by when what the length change did has mostly passed.
+
+    Args:
+        most: samples it has at most, the last.
     """
     time_s = trial.force_time_s
     inside, _ = steady_part(trial, time_s, trial.measured_f0)
@@ -44,7 +47,7 @@ def isometric_window(trial: Trial) -> Window:
             begin_s = longest.end_s - (longest.end_s - longest.start_s) / 3.0
             begin, end = np.searchsorted(time_s, [begin_s, longest.end_s])
             inside = same_calcium(trial, slice(int(begin), int(end)))
-    found = slice(max(inside.start, inside.stop - MOST), inside.stop)
+    found = slice(max(inside.start, inside.stop - most), inside.stop)
     step_s = float(np.median(np.diff(time_s[found]))) if found.stop - found.start > 1 else math.nan
     return Window(trial.facts.trial, step_s, np.asarray(trial.measured_f0[found]))
 
