@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from xb_muscle_ros.files import replaced
@@ -16,6 +17,10 @@ MODEL = "#0b4f8a"
 SECOND = "#c1440e"
 THIRD = "#117a55"
 SHADE = "#e9edf2"
+DATA_LINE: Mapping[str, Any] = MappingProxyType(
+    {"color": DATA, "linewidth": 1.8, "label": "measured", "solid_capstyle": "round"}
+)
+"""A measured trace: broader than a model's, so that it shows on both sides of one that lies on it."""
 
 
 _KEPT: ContextVar[list[Any] | None] = ContextVar("kept", default=None)

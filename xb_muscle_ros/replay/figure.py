@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, SHADE
+from xb_muscle_ros.plotting.style import DATA_LINE, MODEL, SECOND, SHADE
 from xb_muscle_ros.plotting.thinned import thinned
 from xb_muscle_ros.plotting.trial_pages import Look, draw_pages
 from xb_muscle_ros.trials.simulated import Simulated
@@ -60,7 +60,7 @@ def _panel(upper: Any, lower: Any, trial: Trial, simulated: Simulated, label: st
     lines = []
     if trial.force_time_s.size:
         line = _force(trial.force_time_s, trial.force_n, facts.f0_n)
-        lines += lower.plot(*line, color=DATA, linewidth=_LINE, label="measured")
+        lines += lower.plot(*line, **DATA_LINE)
     line = _force(simulated.time_s, simulated.force_n, facts.f0_n)
     lines += lower.plot(*line, color=MODEL, linewidth=_LINE, label=label)
     if live is not None:

@@ -12,7 +12,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.fit.figures.profiles import draw_profiles
 from xb_muscle_ros.fit.problem import Problem
 from xb_muscle_ros.fit.run import Fitted
-from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND, figure, save
+from xb_muscle_ros.plotting.style import DATA, DATA_LINE, MODEL, SECOND, figure, save
 from xb_muscle_ros.plotting.trial_pages import Look, draw_pages
 
 _PER_PAGE = 12
@@ -64,7 +64,7 @@ def _trials(path: Path, fitted: Fitted) -> list[Path]:
 def _panel(upper: Any, lower: Any, fitted: Fitted, trial: Any) -> list[Any]:
     time, problem = trial.force_time_s, fitted.problem
     measured = trial.measured_f0
-    lines = upper.plot(time, measured, color=DATA, linewidth=0.9, label="measured")
+    lines = upper.plot(time, measured, **DATA_LINE)
     start = _force(problem, problem.start, trial)
     if start is not None:
         lines += upper.plot(time, start, color=SECOND, linestyle=(0, (4, 2)), linewidth=0.9, label="start")

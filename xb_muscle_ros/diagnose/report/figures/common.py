@@ -18,7 +18,7 @@ import numpy as np
 from xb_muscle_ros.diagnose.component import Kind
 from xb_muscle_ros.diagnose.report.traces import TrialTraces
 from xb_muscle_ros.diagnose.result import Diagnosis, OfTrial
-from xb_muscle_ros.plotting.style import DATA, MODEL, SECOND
+from xb_muscle_ros.plotting.style import DATA_LINE, MODEL, SECOND
 from xb_muscle_ros.trials.trial import Array
 
 Key = tuple[str, str]
@@ -35,7 +35,6 @@ DOTS: tuple[dict[str, Any], ...] = (
     {"marker": "o", "markerfacecolor": "white", "markeredgecolor": SECOND, "linestyle": "none", "label": "base model"},
     {"marker": "o", "color": MODEL, "linestyle": "none", "label": "answer"},
 )
-_DATA_LINE: dict[str, Any] = {"color": DATA, "linewidth": 1.8, "label": "measured", "solid_capstyle": "round"}
 KIND_LOOKS: Mapping[Kind, dict[str, Any]] = MappingProxyType(
     {
         Kind.MECHANISM: {"facecolor": MODEL, "edgecolor": MODEL},
@@ -137,7 +136,7 @@ def thinned(time: Array, values: Array) -> tuple[Array, Array]:
 
 def plot_force(axis: Any, t: TrialTraces, models: Iterable[Array]) -> list[Any]:
     """Measured force and what base and, if given, answer make of it, F0; handles for a legend."""
-    handles = axis.plot(*thinned(t.time_s, t.measured_f0), **_DATA_LINE)
+    handles = axis.plot(*thinned(t.time_s, t.measured_f0), **DATA_LINE)
     for values, look in zip(models, LINES, strict=False):
         handles += axis.plot(*thinned(t.time_s, values), **look)
     return list(handles)
