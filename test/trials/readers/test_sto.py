@@ -141,6 +141,7 @@ def test_what_is_in_it(tmp_path: Path) -> None:
     contents = READERS["sto"].contents(sto(tmp_path / "a.sto"))
     assert [content.name for content in contents.signals] == list(NAMES)
     assert (contents.signals[0].told_role, contents.facts["nrows"]) == ("time", "200")
+    assert [content.unit for content in contents.signals] == ["s", "m", "N"]
 
 
 def test_a_folder_of_them_becomes_bags(tmp_path: Path) -> None:

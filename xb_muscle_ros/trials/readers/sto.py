@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.inspecting.words import read_name
 from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording
 from xb_muscle_ros.trials.readers.contents import Contents
 from xb_muscle_ros.trials.readers.description import ImportMapping, filled
@@ -21,6 +22,8 @@ from xb_muscle_ros.trials.readers.named_columns import NamedColumn, contents_of,
 
 _NEEDED = "a storage file of OpenSim"
 _END = "endheader"
+# An import takes these where the mapping tells no others.
+_UNITS = {"length": "m", "force": "N"}
 _ROWS, _COLUMNS = ("nrows", "datarows"), ("ncolumns", "datacolumns")
 
 
@@ -87,7 +90,7 @@ class StoReader(Reader):
     suffixes = (".sto", ".mot")
     defaults: Mapping[str, Any] = {
         "fibre": "{file}",
-        "columns": {"time": {"column": "time", "unit": "s"}, "length": {"unit": "m"}},
+        "columns": {"time": {"column": "time", "unit": "s"}, "length": {"unit": _UNITS["length"]}},
     }
     takes = ("decimal",)
 
@@ -96,21 +99,30 @@ class StoReader(Reader):
         columns = told.get("columns")
         if not isinstance(columns, Mapping) or columns.get("force") is None:
             return self.defaults
-        return {**self.defaults, "columns": {**self.defaults["columns"], "force": {"unit": "N"}}}
+        return {**self.defaults, "columns": {**self.defaults["columns"], "force": {"unit": _UNITS["force"]}}}
 
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
         """The one trial of the file."""
         yield Pending(filled(mapping.trial, path), lambda: _recording(path, mapping))
 
     def contents(self, path: Path) -> Contents:
-        """All columns; the format tells no units but that of time."""
+        """All columns; lengths and forces by their names are in the units of OpenSim, which its files do not tell."""
         text = read_lines(path, _NEEDED)
         header = read_header(path, text)
         rows = read_rows(path, text, header.first, header.names)
-        columns = {name: NamedColumn(rows.values[:, i], "s" if i == 0 else "") for i, name in enumerate(header.names)}
+        columns = {
+            name: NamedColumn(rows.values[:, i], "s" if i == 0 else _unit(name)) for i, name in enumerate(header.names)
+        }
         signals = contents_of(columns, self.defaults, rows.at)
         notes = (*rows.notices, *_of_rows(header, rows))
         return Contents(f"OpenSim {header.title}".strip(), signals, facts=header.facts, notes=notes)
+
+
+def _unit(name: str) -> str:
+    """The unit of a column that its name does not tell."""
+    named = read_name(name)
+    units = {_UNITS[role] for role in named.roles if role in _UNITS}
+    return units.pop() if len(units) == 1 and not named.unit else ""
 
 
 def _recording(path: Path, mapping: ImportMapping) -> Recording:
