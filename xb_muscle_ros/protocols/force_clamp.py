@@ -16,7 +16,7 @@ from xb_muscle_ros.protocols import force_velocity_curve as curve
 from xb_muscle_ros.protocols.base import Cell, Column, Found, Option, Planned, Protocol, Run, Settings, run_of
 from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
 from xb_muscle_ros.scores.clamp import ClampWindow, clamp_window, velocity
-from xb_muscle_ros.scores.estimate import Estimate, Missing, notes_of
+from xb_muscle_ros.scores.estimate import Estimate, Missing
 from xb_muscle_ros.scores.readout import isometric_force
 from xb_muscle_ros.simulation.offline import as_simulated, calcium_per_step
 from xb_muscle_ros.trials.protocol import ALLOWED, Allowed
@@ -44,13 +44,11 @@ class ForceClamps(Protocol):
         rate_option(5000.0),
     )  # fmt: skip
     columns: Mapping[str, Column] = {
-        "trial": Column("trial"),
-        "pca": Column("pCa", form="g"),
-        "isometric_f0": Column("isometric force", "F0", ".4f"),
+        **curve.OF_TRIAL,
         "load": Column("load", "isometric force", ".4f"),
         "held_within_f0": Column("load held within", "F0", ".1e"),
         "shortening_l0_per_s": Column("velocity of shortening", "L0/s", ".4f"),
-        "power_f0_l0_per_s": Column("power", "F0·L0/s", ".4f"),
+        **curve.POWER,
     }
     numbers = curve.NUMBERS
     source = "Hill 1938"
@@ -90,17 +88,7 @@ class ForceClamps(Protocol):
             row, whys = _row(run)
             rows.append(row)
             told += [(run.trial.facts.trial, why) for why in whys]
-        found = Found(fibre, of, tuple(rows), runs=tuple(runs))
-        pcas = np.unique(np.round(found.column("pca")[np.isfinite(found.column("pca"))], 6))
-        notes = notes_of(told)
-        if pcas.size > 1:
-            notes.append(f"Hill's hyperbola is that of pCa {pcas[0]:g}, the most calcium; give one --pca for another")
-        most = np.isclose(found.column("pca"), pcas[0]) if pcas.size else np.full(len(rows), True)
-        isometric = found.column("isometric_f0")[most]
-        level = float(np.nanmedian(isometric)) if np.any(np.isfinite(isometric)) else np.nan
-        load, speed = found.column("load")[most], found.column("shortening_l0_per_s")[most]
-        numbers, curves, more = curve.numbers_of(load, speed, level, True)
-        return replace(found, numbers=numbers, curves=curves, notes=(*notes, *more))
+        return curve.found_of(fibre, of, runs, rows, told, True)
 
     def draw(self, figure: Any, found: Sequence[Found]) -> None:
         """Length against time, velocity and power against load."""
@@ -108,7 +96,7 @@ class ForceClamps(Protocol):
 
     def size_mm(self, found: Sequence[Found]) -> tuple[float, float]:
         """Three axes beside each other."""
-        return 190.0, 70.0
+        return curve.SIZE_MM
 
 
 def _under_load(

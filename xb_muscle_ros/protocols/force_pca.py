@@ -10,7 +10,7 @@ from scipy.stats import t as student
 
 from xb_muscle_ros.protocols.base import Cell, Column, Curve, Found, Number, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.figures import legend, lettered, looks
-from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
+from xb_muscle_ros.protocols.inputs import pca_option, planned_at_each_pca, rate_option
 from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.scores.force_pca import fit_force_pca, hill_curve
 from xb_muscle_ros.scores.readout import isometric_force
@@ -46,16 +46,8 @@ class ForcePca(Protocol):
 
     def plan(self, fibre: str, settings: Settings) -> list[Planned]:
         """One trial for each pCa."""
-        duration, rate = settings["duration"][0], settings["rate"][0]
-        return [
-            planned_between(
-                facts_of(self.name, fibre, f"force_pca{10.0 * pca:g}", {"pca": pca}),
-                [("isometric", duration, 0.0)],
-                pca,
-                rate,
-            )
-            for pca in settings["pca"]
-        ]
+        steps = [("isometric", settings["duration"][0], 0.0)]
+        return planned_at_each_pca(self.name, fibre, "force", steps, settings)
 
     def analyse(self, fibre: str, of: str, runs: Sequence[Run]) -> Found:
         """Mean steady force of each trial, and Hill's equation through the means of each pCa."""

@@ -13,7 +13,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.protocols import force_velocity_curve as curve
 from xb_muscle_ros.protocols.base import Cell, Column, Found, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
-from xb_muscle_ros.scores.estimate import Estimate, notes_of, quotient
+from xb_muscle_ros.scores.estimate import Estimate, quotient
 from xb_muscle_ros.scores.readout import isometric_force
 from xb_muscle_ros.trials.protocol import ALLOWED, Allowed
 from xb_muscle_ros.trials.trial import Phase
@@ -39,13 +39,11 @@ class ConstantVelocities(Protocol):
         rate_option(5000.0),
     )  # fmt: skip
     columns: Mapping[str, Column] = {
-        "trial": Column("trial"),
-        "pca": Column("pCa", form="g"),
-        "isometric_f0": Column("isometric force", "F0", ".4f"),
+        **curve.OF_TRIAL,
         "shortening_l0_per_s": Column("velocity of shortening", "L0/s", ".4g"),
         "force_f0": Column("force at mid-ramp", "F0", ".4f"),
         "load": Column("over isometric force", "", ".4f"),
-        "power_f0_l0_per_s": Column("power", "F0·L0/s", ".4f"),
+        **curve.POWER,
     }
     numbers = curve.NUMBERS
     source = "e.g. Edman 1988"
@@ -82,18 +80,7 @@ class ConstantVelocities(Protocol):
             row, why = _row(run)
             rows.append(row)
             told += [(run.trial.facts.trial, why)] if why else []
-        found = Found(fibre, of, tuple(rows), runs=tuple(runs))
-        pca = found.column("pca")
-        pcas = np.unique(np.round(pca[np.isfinite(pca)], 6))
-        notes = notes_of(told)
-        if pcas.size > 1:
-            notes.append(f"Hill's hyperbola is that of pCa {pcas[0]:g}, the most calcium; give one --pca for another")
-        most = np.isclose(pca, pcas[0]) if pcas.size else np.full(len(rows), True)
-        isometric = found.column("isometric_f0")[most]
-        level = float(np.nanmedian(isometric)) if np.any(np.isfinite(isometric)) else np.nan
-        load, speed = found.column("load")[most], found.column("shortening_l0_per_s")[most]
-        numbers, curves, more = curve.numbers_of(load, speed, level, False)
-        return replace(found, numbers=numbers, curves=curves, notes=(*notes, *more))
+        return curve.found_of(fibre, of, runs, rows, told, False)
 
     def draw(self, figure: Any, found: Sequence[Found]) -> None:
         """Force against time, velocity and power against force."""
@@ -101,7 +88,7 @@ class ConstantVelocities(Protocol):
 
     def size_mm(self, found: Sequence[Found]) -> tuple[float, float]:
         """Three axes beside each other."""
-        return 190.0, 70.0
+        return curve.SIZE_MM
 
 
 def _ramp(run: Run) -> Phase | None:

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.protocols.base import Column, Curve, Found, Number
+from xb_muscle_ros.protocols.base import Cell, Column, Curve, Found, Number, Run
 from xb_muscle_ros.protocols.figures import legend, lettered, looks
-from xb_muscle_ros.scores.estimate import Missing
+from xb_muscle_ros.scores.estimate import Missing, notes_of
 from xb_muscle_ros.scores.force_velocity import HillCurve, fit_hill, hill_velocity
 from xb_muscle_ros.trials.trial import Array
 
+# Columns of both tables, at their begin and at their end.
+OF_TRIAL: Mapping[str, Column] = {
+    "trial": Column("trial"),
+    "pca": Column("pCa", form="g"),
+    "isometric_f0": Column("isometric force", "F0", ".4f"),
+}
+POWER: Mapping[str, Column] = {"power_f0_l0_per_s": Column("power", "F0·L0/s", ".4f")}
+SIZE_MM = (190.0, 70.0)
 NUMBERS: Mapping[str, Column] = {
     "vmax_l0_per_s": Column("vmax", "L0/s", ".3f"),
     "a_over_f0": Column("a/F0", "", ".3f"),
@@ -23,7 +32,36 @@ NUMBERS: Mapping[str, Column] = {
 }
 
 
-def numbers_of(
+def found_of(
+    fibre: str,
+    of: str,
+    runs: Sequence[Run],
+    rows: Sequence[Mapping[str, Cell]],
+    told: Sequence[tuple[str, str]],
+    load_is_given: bool,
+) -> Found:
+    """A table with Hill's hyperbola through its rows of most calcium.
+
+    Args:
+        rows: with ``pca``, ``isometric_f0``, ``load`` and ``shortening_l0_per_s``, one for each run.
+        told: trial and why it lacks something.
+        load_is_given: see `fit_hill`.
+    """
+    found = Found(fibre, of, tuple(rows), runs=tuple(runs))
+    pca = found.column("pca")
+    pcas = np.unique(np.round(pca[np.isfinite(pca)], 6))
+    notes = notes_of(told)
+    if pcas.size > 1:
+        notes.append(f"Hill's hyperbola is that of pCa {pcas[0]:g}, the most calcium; give one --pca for another")
+    most = np.isclose(pca, pcas[0]) if pcas.size else np.full(len(rows), True)
+    isometric = found.column("isometric_f0")[most]
+    level = float(np.nanmedian(isometric)) if np.any(np.isfinite(isometric)) else np.nan
+    load, speed = found.column("load")[most], found.column("shortening_l0_per_s")[most]
+    numbers, curves, more = _numbers_of(load, speed, level, load_is_given)
+    return replace(found, numbers=numbers, curves=curves, notes=(*notes, *more))
+
+
+def _numbers_of(
     load: Array, velocity_l0_per_s: Array, isometric_f0: float, load_is_given: bool
 ) -> tuple[dict[str, Number], dict[str, Curve], list[str]]:
     """Numbers of `NUMBERS`, the curve (load, velocity), and notes.

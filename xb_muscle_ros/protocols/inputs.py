@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.protocols.base import Option, Planned
+from xb_muscle_ros.protocols.base import Option, Planned, Settings
 from xb_muscle_ros.trials.protocol import ALLOWED
 from xb_muscle_ros.trials.trial import Array, Phase, Trial, TrialFacts
 
@@ -80,3 +81,28 @@ def planned_between(
 def facts_of(protocol: str, fibre: str, trial: str, settings: Mapping[str, float]) -> TrialFacts:
     """Facts of a trial that a protocol makes; `settings` are its numbers, by name with unit."""
     return TrialFacts(fibre=fibre, trial=trial, protocol=protocol, settings=tuple(settings.items()))
+
+
+def planned_at_each_pca(
+    protocol: str,
+    fibre: str,
+    stem: str,
+    steps: Sequence[tuple[str, float, float]],
+    settings: Settings,
+    told: Mapping[str, float] = MappingProxyType({}),
+) -> list[Planned]:
+    """The same lengths at each pCa of the settings.
+
+    Args:
+        stem: names of trials begin with it.
+        steps: see `planned_between`.
+        told: numbers of the protocol for all trials, by name with unit.
+
+    Raises:
+        UserError: there would be too many samples.
+    """
+    made = []
+    for pca in settings["pca"]:
+        facts = facts_of(protocol, fibre, f"{stem}_pca{10.0 * pca:g}", {"pca": pca, **told})
+        made.append(planned_between(facts, steps, pca, settings["rate"][0]))
+    return made

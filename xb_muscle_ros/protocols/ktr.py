@@ -9,7 +9,7 @@ import numpy as np
 
 from xb_muscle_ros.protocols.base import Cell, Column, Found, Number, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.figures import legend, lettered, looks
-from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
+from xb_muscle_ros.protocols.inputs import pca_option, planned_at_each_pca, rate_option
 from xb_muscle_ros.scores.estimate import notes_of
 from xb_muscle_ros.scores.readout import isometric_force
 from xb_muscle_ros.scores.redevelopment import LONGEST_RELEASE_S, SMALLEST_RELEASE_L0, redevelopment_rate, restretch_end
@@ -53,7 +53,7 @@ class RedevelopmentRates(Protocol):
 
     def plan(self, fibre: str, settings: Settings) -> list[Planned]:
         """One trial for each pCa."""
-        release, slack, follow, lead, rate = (settings[k][0] for k in ("release", "slack", "follow", "lead", "rate"))
+        release, slack, follow, lead = (settings[k][0] for k in ("release", "slack", "follow", "lead"))
         steps = [
             ("isometric", lead, 0.0),
             ("release", RAMP_S, -release),
@@ -61,17 +61,8 @@ class RedevelopmentRates(Protocol):
             ("stretch", RAMP_S, release),
             ("recovery", follow, 0.0),
         ]
-        return [
-            planned_between(
-                facts_of(
-                    self.name, fibre, f"ktr_pca{10.0 * pca:g}", {"pca": pca, "release_l0": release, "slack_s": slack}
-                ),
-                steps,
-                pca,
-                rate,
-            )
-            for pca in settings["pca"]
-        ]
+        told = {"release_l0": release, "slack_s": slack}
+        return planned_at_each_pca(self.name, fibre, "ktr", steps, settings, told)
 
     def analyse(self, fibre: str, of: str, runs: Sequence[Run]) -> Found:
         """k_tr of each trial, and how much of the force before comes back while it is followed."""

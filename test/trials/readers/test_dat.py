@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from changes import swap
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -265,14 +266,6 @@ def test_a_last_line_that_was_cut_is_left_out_and_told(tmp_path: Path) -> None:
         assert re.search(r"a\.dat, line \d+: the last line was cut short and is left out", warning)
 
 
-def _with(old: bytes, new: bytes) -> Callable[[bytes], bytes]:
-    def change(data: bytes) -> bytes:
-        assert old in data
-        return data.replace(old, new, 1)
-
-    return change
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -280,22 +273,25 @@ def _with(old: bytes, new: bytes) -> Callable[[bytes], bytes]:
         (lambda data: data[:300], "ends within its header; needed is a data file of the 600A software"),
         (lambda data: data[: data.index(b"Time (ms)  Lin")], "names no columns below"),
         (lambda data: data[: data.index(b"0.0  1.25")], "has no whole rows below its header"),
-        (_with(b"5.0  1.2", b"5.0  x1.2"), "column 'Lin' holds 'x1.250000'; needed is a number"),
-        (_with(b"5.0  1.2", b"5.0  7 1.2"), "has 6 cells; needed are 5: Time, Lin, Lout, Fin, Fout"),
-        (_with(b"5.0  1.250000  1.250000", b"5.0  1.250000"), "has 4 cells; needed are 5"),
-        (_with(b"5.0  1.250000", b"5.0  nan"), "column 'Lin' is nan; allowed are finite numbers"),
-        (_with(b"5.0  1.250000", b"5.0  1,250000"), "decimal commas and points in one file; tell which"),
-        (_with(b"5.0  1.250000", b"5.0  1_2"), "column 'Lin' holds '1_2'"),
-        (_with(b"\r\n6.0  ", b"\r\n4.0  "), "column 'Time': 0.004 s does not come after 0.005 s"),
-        (_with(b"Fin (mN)", b"Force (mN)"), "has no column 'Fin'; its columns: Time, Lin, Lout, Force, Fout; name"),
-        (_with(b"Fout (mN)", b"Fin (mN)"), "has more than one column 'Fin'; rename one"),
-        (_with(b"Fiber Length: 1.250 mm", b"Fiber Length: 1.250 yd"), "Fiber Length: unit 'yd' of length is not known"),
+        (swap(b"5.0  1.2", b"5.0  x1.2"), "column 'Lin' holds 'x1.250000'; needed is a number"),
+        (swap(b"5.0  1.2", b"5.0  7 1.2"), "has 6 cells; needed are 5: Time, Lin, Lout, Fin, Fout"),
+        (swap(b"5.0  1.250000  1.250000", b"5.0  1.250000"), "has 4 cells; needed are 5"),
+        (swap(b"5.0  1.250000", b"5.0  nan"), "column 'Lin' is nan; allowed are finite numbers"),
+        (swap(b"5.0  1.250000", b"5.0  1,250000"), "decimal commas and points in one file; tell which"),
+        (swap(b"5.0  1.250000", b"5.0  1_2"), "column 'Lin' holds '1_2'"),
+        (swap(b"\r\n6.0  ", b"\r\n4.0  "), "column 'Time': 0.004 s does not come after 0.005 s"),
+        (swap(b"Fin (mN)", b"Force (mN)"), "has no column 'Fin'; its columns: Time, Lin, Lout, Force, Fout; name"),
+        (swap(b"Fout (mN)", b"Fin (mN)"), "has more than one column 'Fin'; rename one"),
         (
-            _with(b"Fiber Length: 1.250 mm", b"Fiber Length: 1.250 mm\r\nFiber Length: 1.3 mm"),
+            swap(b"Fiber Length: 1.250 mm", b"Fiber Length: 1.250 yd"),
+            "Fiber Length: unit 'yd' of length is not known",
+        ),
+        (
+            swap(b"Fiber Length: 1.250 mm", b"Fiber Length: 1.250 mm\r\nFiber Length: 1.3 mm"),
             "Fiber Length is in the header as 1.250 mm and as 1.3 mm; mend the header",
         ),
-        (_with(b"Fiber Length: 1.250 mm", b"Fiber Length: 1250 mm"), "fibres have 1e-05 to 0.7 m"),
-        (_with(b"1.25", b"1.2\x005"), "is no plain text"),
+        (swap(b"Fiber Length: 1.250 mm", b"Fiber Length: 1250 mm"), "fibres have 1e-05 to 0.7 m"),
+        (swap(b"1.25", b"1.2\x005"), "is no plain text"),
     ],
 )
 def test_what_is_broken_is_told_in_one_line(tmp_path: Path, change: Callable[[bytes], bytes], words: str) -> None:

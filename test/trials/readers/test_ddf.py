@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from changes import swap
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -210,14 +211,6 @@ def test_samples_that_are_missing_are_told(tmp_path: Path) -> None:
     assert any("column 'Sample': samples are missing from 0.0995 to 0.11 s" in line for line in trial.warnings)
 
 
-def _with(old: bytes, new: bytes) -> Callable[[bytes], bytes]:
-    def change(data: bytes) -> bytes:
-        assert old in data
-        return data.replace(old, new, 1)
-
-    return change
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -225,20 +218,26 @@ def _with(old: bytes, new: bytes) -> Callable[[bytes], bytes]:
         (lambda data: b"DMC\n" + data, "does not begin with DMC ... Data File"),
         (lambda data: data[:300], "ends within its header"),
         (lambda data: data[: data.index(b"\n0\t0.6")], "has no whole rows below its header"),
-        (_with(b"Sample Frequency (Hz): 2000\n", b""), "Sample Frequency (Hz) is missing in the header"),
-        (_with(b"(Hz): 2000", b"(Hz): fast"), "Sample Frequency (Hz) is 'fast' in the header"),
-        (_with(b"(Hz): 2000", b"(Hz): 0"), "Sample Frequency (Hz) is '0' in the header"),
-        (_with(b"(Hz): 2000\n", b"(Hz): 2000\nSample Frequency (Hz): 10\n"), "is in the header twice, and differently"),
-        (_with(b"(Hz): 2000", b"(Hz): 2"), "samples are 0.5 s apart; allowed is"),
-        (_with(b"Calibration Data:", b"Calibration"), "the header has no calibration"),
-        (_with(b"500.000000", b"lots"), "Scale (units/V) of AI1 is 'lots' in the header; needed is a number"),
-        (_with(b"500.000000", b"0.000000"), "Scale (units/V) of AI1 is 0 in the header, so its volts have no meaning"),
-        (_with(b"\n5\t0.6", b"\n5\tx0.6"), "column 'AI0' holds 'x0.600000'; needed is a number"),
-        (_with(b"\n5\t0.6", b'\n5\t"a"\t0.6'), "has 7 cells; needed are 6: Sample, AI0, AI1, AI2, AO0, Stim"),
-        (_with(b"\n5\t0.600000", b"\n5\tinf"), "column 'AI0' is inf"),
-        (_with(b"\n6\t", b"\n5\t"), "column 'Sample': 0.0025 s does not come after 0.0025 s"),
-        (_with(b"Reference Length: 12.5 mm", b"Reference Length: 12.5 in"), "Reference Length: unit 'in' of length"),
-        (_with(b"Reference Force: 400.000 mN", b"Reference Force: 400.000 g"), "Reference Force: unit 'g' of force"),
+        (swap(b"Sample Frequency (Hz): 2000\n", b""), "Sample Frequency (Hz) is missing in the header"),
+        (swap(b"(Hz): 2000", b"(Hz): fast"), "Sample Frequency (Hz) is 'fast' in the header"),
+        (swap(b"(Hz): 2000", b"(Hz): 0"), "Sample Frequency (Hz) is '0' in the header"),
+        (
+            swap(b"(Hz): 2000\n", b"(Hz): 2000\nSample Frequency (Hz): 10\n"),
+            "is in the header twice, and differently",
+        ),
+        (swap(b"(Hz): 2000", b"(Hz): 2"), "samples are 0.5 s apart; allowed is"),
+        (swap(b"Calibration Data:", b"Calibration"), "the header has no calibration"),
+        (swap(b"500.000000", b"lots"), "Scale (units/V) of AI1 is 'lots' in the header; needed is a number"),
+        (
+            swap(b"500.000000", b"0.000000"),
+            "Scale (units/V) of AI1 is 0 in the header, so its volts have no meaning",
+        ),
+        (swap(b"\n5\t0.6", b"\n5\tx0.6"), "column 'AI0' holds 'x0.600000'; needed is a number"),
+        (swap(b"\n5\t0.6", b'\n5\t"a"\t0.6'), "has 7 cells; needed are 6: Sample, AI0, AI1, AI2, AO0, Stim"),
+        (swap(b"\n5\t0.600000", b"\n5\tinf"), "column 'AI0' is inf"),
+        (swap(b"\n6\t", b"\n5\t"), "column 'Sample': 0.0025 s does not come after 0.0025 s"),
+        (swap(b"Reference Length: 12.5 mm", b"Reference Length: 12.5 in"), "Reference Length: unit 'in' of length"),
+        (swap(b"Reference Force: 400.000 mN", b"Reference Force: 400.000 g"), "Reference Force: unit 'g' of force"),
     ],
 )
 def test_what_is_broken_is_told_in_one_line(tmp_path: Path, change: Callable[[bytes], bytes], words: str) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from changes import swap
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -87,27 +88,22 @@ def test_rows_that_are_not_as_many_as_told_are_told(tmp_path: Path) -> None:
     assert "its header tells of 199" in warning
 
 
-def _with(old: str, new: str) -> Callable[[str], str]:
-    def change(text: str) -> str:
-        assert old in text
-        return text.replace(old, new, 1)
-
-    return change
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         (lambda text: "", "is empty; needed is a storage file of OpenSim"),
-        (_with("endheader\n", ""), "has no line 'endheader'"),
+        (swap("endheader\n", ""), "has no line 'endheader'"),
         (lambda text: text[: text.index("time")], "no columns are named below 'endheader'"),
         (lambda text: text[: text.index("0.00000000")], "has no whole rows below its header"),
-        (_with("nColumns=3", "nColumns=4"), "names 3 columns, the header tells of 4"),
-        (_with("0.00500000\t", "0.00500000\tx"), "column 'soleus_r/fiber_length' holds 'x0.05"),
-        (_with("0.00500000\t", "0.00500000\t1\t"), "has 4 cells; needed are 3: time, soleus_r"),
-        (_with("0.00500000\t", "0.00400000\t"), "column 'time': 0.004 s does not come after 0.004 s"),
-        (_with("soleus_r/force", "soleus_r/fiber_length"), "has more than one column 'soleus_r/fiber_length'"),
-        (_with("soleus_r/force", "gastroc/force"), "has no column 'soleus_r/force'; its columns: time, soleus_r/fiber"),
+        (swap("nColumns=3", "nColumns=4"), "names 3 columns, the header tells of 4"),
+        (swap("0.00500000\t", "0.00500000\tx"), "column 'soleus_r/fiber_length' holds 'x0.05"),
+        (swap("0.00500000\t", "0.00500000\t1\t"), "has 4 cells; needed are 3: time, soleus_r"),
+        (swap("0.00500000\t", "0.00400000\t"), "column 'time': 0.004 s does not come after 0.004 s"),
+        (swap("soleus_r/force", "soleus_r/fiber_length"), "has more than one column 'soleus_r/fiber_length'"),
+        (
+            swap("soleus_r/force", "gastroc/force"),
+            "has no column 'soleus_r/force'; its columns: time, soleus_r/fiber",
+        ),
     ],
 )
 def test_what_is_broken_is_told_in_one_line(tmp_path: Path, change: Callable[[str], str], words: str) -> None:
