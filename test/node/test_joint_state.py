@@ -19,6 +19,7 @@ from sensor_msgs.msg import JointState
 from xb_muscle_ros.node import traffic
 from xb_muscle_ros.node.joint_state import Alike, Joints
 from xb_muscle_ros.trials.joint_layout import FIELDS, Layout
+from xb_muscle_ros.trials.ros_types import joint_state
 
 TEXTS = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9)
 NUMBERS = st.lists(st.floats(allow_nan=True, allow_infinity=True), max_size=5)
@@ -193,3 +194,17 @@ def test_unknown_middleware_gets_whole_messages_and_a_word(monkeypatch: pytest.M
     heard: list[Joints] = []
     traffic.hearing(heard.append, False)(JointState(name=["a"], position=[2.0]))
     assert (heard[0].names, heard[0].position.tolist()) == (("a",), [2.0])
+
+
+def test_what_follows_a_message_is_nobodys() -> None:
+    message = JointState(name=["a"], position=[1.0, 2.0])
+    data = joint_state(0, ["a"], position=np.array([1.0, 2.0]))
+    layout = Layout.of(data + bytes(range(8)))
+    assert layout is not None
+    assert layout.trimmed(data + bytes(range(8))) == data
+    # rclpy makes more bytes than it fills.
+    made = serialize_message(message)
+    found = Layout.of(made)
+    assert found is not None
+    assert len(found.trimmed(made)) == len(data)
+    assert deserialize_message(found.trimmed(made), JointState) == message

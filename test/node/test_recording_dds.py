@@ -183,3 +183,28 @@ def test_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
 def test_environment_is_private(domain: int) -> None:
     assert os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
     assert os.environ["ROS_DOMAIN_ID"] == str(domain)
+
+
+def test_what_a_node_and_a_player_say_can_be_read(domain: int, tmp_path: Path) -> None:
+    """Messages that are published as bytes are no longer than what is in them: no reader takes a longer one."""
+    node = subprocess.Popen(
+        [sys.executable, "-m", "xb_muscle_ros.node.main", "--ros-args", "-p", "fiber_file:=18Dec2017a", "-p",
+         "mode:=lockstep"],
+        env=child_environment(domain), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    recorder = subprocess.Popen(
+        [sys.executable, "-m", "xb_muscle_ros.cli.main", "record", "--fiber", "18Dec2017a", "--trial", "live",
+         "--wait", "40", "--duration", "8", "--out", str(tmp_path / "live")],
+        env=child_environment(domain), stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        made = xb.run_protocol("ramp-hold", "18Dec2017a", pca=4.5, rate=500.0, live=True, tell=lambda line: None)
+        recorder.communicate(timeout=60.0)
+    finally:
+        for process in (recorder, node):
+            process.kill()
+            process.communicate(timeout=10.0)
+    (trial,) = xb.read_trials(tmp_path / "live", tell=lambda line: None)
+    (run,) = made.results[0].runs
+    assert trial.length_m.size == run.time_s.size
+    assert np.array_equal(trial.force_n if trial.force_n.size else run.simulated.force_n, run.simulated.force_n)

@@ -13,10 +13,11 @@ import pytest
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.evaluate.checks import check_trial
-from xb_muscle_ros.trials.bags import write_trial
+from xb_muscle_ros.trials.bags import read_trial, write_trial
 from xb_muscle_ros.trials.completing import Known
 from xb_muscle_ros.trials.phases import conditioning, detect_phases
 from xb_muscle_ros.trials.protocol import StretchShortenStretch
+from xb_muscle_ros.trials.readers.registry import READERS
 from xb_muscle_ros.trials.trial import Trial
 
 
@@ -258,3 +259,21 @@ def test_samples_that_nothing_can_be_compared_by_are_refused(
     bag = foreign.write_folder(tmp_path / "bag", [foreign.messages(few)], foreign.facts_of(few, ("phases",)))
     with pytest.raises(UserError, match=f"there are {words}.*; needed are 3; leave the bag out"):
         foreign.study(bag)
+
+
+@pytest.mark.parametrize("long", ["all", "one of two"])
+def test_bytes_behind_a_message_are_nobodys(tmp_path: Path, long: str) -> None:
+    """Serialization in rclpy makes more bytes than it fills; who publishes those has them in the bag."""
+    made = foreign.recording()
+    whole = foreign.messages(made)
+    padded = [one._replace(data=one.data + bytes(8)) if long == "all" or i % 2 else one for i, one in enumerate(whole)]
+    facts = foreign.facts_of(made)
+    plain, other = (
+        read_trial(foreign.write_folder(tmp_path / name, [part], facts))
+        for name, part in (("plain", whole), ("padded", padded))
+    )
+    assert other.time_s.tolist() == plain.time_s.tolist()
+    assert other.length_m.tolist() == plain.length_m.tolist()
+    assert other.force_n.tolist() == plain.force_n.tolist()
+    recorded = READERS["bag"].contents(tmp_path / "padded")
+    assert any(content.finite.size == made.time_s.size for content in recorded.signals)

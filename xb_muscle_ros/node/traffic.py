@@ -78,6 +78,9 @@ class Outlet:
         numbers = {field: _own(self._message, field) for field in FIELDS}
         data = serialize_message(self._message) if bytes_ else b""
         layout = Layout.of(data)
+        if layout is not None and layout.end < len(data):
+            data = layout.trimmed(data)
+            layout = Layout.of(data)
         if layout is not None and layout.names == tuple(names) and _counts(layout) == [len(numbers[f]) for f in FIELDS]:
             # With these bytes before it all numbers are aligned.
             self._data = np.zeros(4 + len(data), dtype=np.uint8)[4:]

@@ -18,6 +18,7 @@ from xb_muscle_ros import fast_yaml
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import ros_types
 from xb_muscle_ros.trials.bag_files import METADATA, mcap_files
+from xb_muscle_ros.trials.joint_layout import Layout
 from xb_muscle_ros.trials.mcap_records import Recording, read_recording
 from xb_muscle_ros.trials.messages import Message, Messages
 
@@ -198,9 +199,19 @@ def decoded(bag: BagContents, topic: str, messages: Iterable[Message], store: Ty
         )
     for i, each in enumerate(messages):
         try:
-            yield AnyMessage(topic, each.log_time_ns, store.deserialize_cdr(each.data, kind))
+            yield AnyMessage(topic, each.log_time_ns, _deserialized(each.data, kind, store))
         except (SerdeError, struct.error, ValueError, IndexError) as problem:
             raise UserError(f"bag {bag.path}: {topic}, message {i} cannot be decoded: {problem}") from problem
+
+
+def _deserialized(data: bytes, kind: str, store: Typestore) -> Any:
+    try:
+        return store.deserialize_cdr(data, kind)
+    except SerdeError:
+        layout = Layout.of(data) if kind == ros_types.JOINT_STATE else None
+        if layout is None or layout.end == len(data):
+            raise
+        return store.deserialize_cdr(layout.trimmed(data), kind)
 
 
 def all_decoded(bag: BagContents) -> Iterator[AnyMessage]:

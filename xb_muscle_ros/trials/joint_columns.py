@@ -205,7 +205,8 @@ def _confirmed(layout: Layout, message: bytes) -> bool:
         probe[numbers.begin : numbers.begin + DOUBLE.itemsize * numbers.size] = expected[-1].astype(DOUBLE).tobytes()
         begin += numbers.size
     try:
-        read = cast(JointState, ros_types.typestore().deserialize_cdr(bytes(probe), ros_types.JOINT_STATE))
+        whole = layout.trimmed(bytes(probe))
+        read = cast(JointState, ros_types.typestore().deserialize_cdr(whole, ros_types.JOINT_STATE))
     except SerdeError:
         return False
     stamp = read.header.stamp

@@ -51,6 +51,7 @@ class Layout(NamedTuple):
         fixed: all that a reader looks at on its way, but for stamp and numbers: first and last byte of each piece.
         names: as they stand there.
         position, velocity, effort: numbers.
+        end: behind its last byte; what follows up to `size` is nobody's.
     """
 
     size: int
@@ -59,6 +60,7 @@ class Layout(NamedTuple):
     position: Numbers
     velocity: Numbers
     effort: Numbers
+    end: int
 
     @classmethod
     def of(cls, data: bytes) -> Layout | None:
@@ -109,8 +111,11 @@ class Layout(NamedTuple):
             return None
         names = tuple(text() for _ in range(many))
         fields = numbers(), numbers(), numbers()
-        # What comes after its end is nobody's.
-        return cls(len(data), tuple(fixed), names, *fields) if at <= len(data) else None
+        return cls(len(data), tuple(fixed), names, *fields, at) if at <= len(data) else None
+
+    def trimmed(self, data: bytes) -> bytes:
+        """A message without what follows its end: rclpy's serialization makes more bytes than it fills."""
+        return data[: self.end]
 
     def stamp_ns(self, data: bytes) -> int:
         """Time in the header, ns."""
