@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import xb_muscle_ros as xb
+from xb_muscle_ros.protocols.force_velocity_curve import _numbers_of
 from xb_muscle_ros.scores.clamp import clamp_window, velocity
 from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.scores.force_velocity import fit_hill, hill_force, hill_velocity
@@ -140,3 +144,50 @@ def test_a_trial_without_a_clamp_is_a_note() -> None:
 def test_a_load_that_no_fibre_bears_is_one_line() -> None:
     with pytest.raises(xb.UserError, match=r"trial clamp_load2500_pca45: fibre 18Dec2017a: load of"):
         xb.run_protocol("force-clamp", "18Dec2017a", load=2.5, hold=2.0, tell=lambda line: None)
+
+
+def test_one_load_that_is_not_borne_leaves_the_others() -> None:
+    told: list[str] = []
+    loads = [0.0, 0.2, 0.3, 0.5, 0.7, 0.9]
+    (found,) = xb.run_protocol("force-clamp", "18Dec2017a", load=loads, tell=told.append).results
+    assert found.column("load") == pytest.approx(loads[1:], abs=1e-6)
+    assert any(
+        "trial clamp_load0_pca45" in line and "less than the fibre bears" in line and "is left out" in line
+        for line in told
+    )
+    assert found.notes[0] in told
+    assert np.isfinite(found.numbers["vmax_l0_per_s"].value or np.nan)
+
+
+def test_a_model_repeats_a_clamp_that_a_release_began(tmp_path: Path) -> None:
+    """The load is a share of the isometric force, not of what the release has left of it: that gave its square."""
+    loads = [0.2, 0.3, 0.5, 0.7, 0.9]
+    made = xb.run_protocol("force-clamp", "18Dec2017a", load=loads, hold=0.3, as_measured=True, tell=lambda _: None)
+    untold = [replace(t, facts=replace(t.facts, settings=(), protocol="", phases=())) for t in made.trials]
+    xb.write_trials(untold, tmp_path)
+    measured, model = xb.analyse_protocol(
+        "force-clamp", tmp_path, model="3state_coop", fibre="18Dec2017a", tell=lambda _: None
+    ).results
+    assert sorted(measured.column("load")) == pytest.approx(loads, abs=1e-4)
+    assert model.column("load") == pytest.approx(measured.column("load"), abs=1e-5)
+    assert model.column("shortening_l0_per_s") == pytest.approx(measured.column("shortening_l0_per_s"), rel=1e-4)
+
+
+def test_the_power_curve_is_that_of_the_hyperbola_s_pca() -> None:
+    loads = [0.1, 0.2, 0.3, 0.5, 0.7, 0.9]
+    (found,) = xb.run_protocol("force-clamp", "18Dec2017a", pca=[4.5, 6.3], load=loads, tell=lambda _: None).results
+    assert np.max(found.curves["power"].y) == pytest.approx(found.numbers["power_f0_l0_per_s"].value, rel=1e-3)
+
+
+def test_force_that_still_changes_is_told() -> None:
+    told: list[str] = []
+    xb.run_protocol("force-velocity", "18Dec2017a", model="hill_se", velocity=[-0.05, -0.5], tell=told.append)
+    assert any("trial velocity_minus0.5_pca45: it still changes at the middle of the ramp" in line for line in told)
+    assert not any("velocity_minus0.05" in line for line in told)
+
+
+def test_a_vmax_that_the_points_do_not_tell_is_said() -> None:
+    load, speed = np.array([0.02, 0.3, 0.5, 0.7]), np.array([3.0, 0.3, 0.2, 0.1])
+    numbers, _, told = _numbers_of(load, speed, 1.0, False)
+    assert numbers["vmax_l0_per_s"].low < 0.0
+    assert told[0] == "vmax: the 95 % interval goes down to 0 or below; these points do not tell it"

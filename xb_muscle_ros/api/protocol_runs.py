@@ -18,14 +18,18 @@ def answers(
     settle: float | None,
     as_measured: bool,
     live: bool,
+    lacking: list[str] | None = None,
 ) -> Iterator[Run]:
     """What a model, or with `live` a running node, answers to planned trials, one after the other.
+
+    Args:
+        lacking: see `running.answers`.
 
     Raises:
         UserError: see `Protocol.answer` and `play_live`; a settling time for a node.
     """
     if not live:
-        yield from running.answers(protocol, fibre, planned, settle, as_measured)
+        yield from running.answers(protocol, fibre, planned, settle, as_measured, lacking)
         return
     if settle is not None:
         raise UserError("--live leaves settling to the node; drop --settle")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -183,13 +183,15 @@ def run_protocol(
     whose = fibre_of(fibre, model, method, set, lines)
     runs = []
     planned = chosen.plan(whose.name, settings)
-    for run in answers(chosen, whose, planned, settle, as_measured, live):
+    lacking: list[str] = []
+    for run in answers(chosen, whose, planned, settle, as_measured, live, lacking):
         runs.append(run)
         if each is not None:
             each(run)
     told = [pushing(run.trial, run.simulated, whose.model) for run in runs if run.simulated is not None]
     lines.say(*one_for_all([line for line in told if line]))
     found = chosen.analyse(whose.name, whose.model, runs)
+    found = replace(found, notes=(*lacking, *found.notes))
     lines.say(*found.notes)
     return ProtocolResult(chosen.name, (found,), tuple(lines))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from xb_muscle_ros.cli import common
@@ -68,10 +69,11 @@ def run(arguments: argparse.Namespace) -> int:
     paths = [bag_path(arguments.out, arguments.prefix, each.trial) for each in planned]
     told = arguments.protocol is not None
     check_room(arguments.out, protocol if told else None, paths, arguments.overwrite)
-    runs, pushed = [], []
+    runs, pushed, lacking = [], [], list[str]()
     with Progress(len(planned), "simulate") as progress:
-        asked = (protocol, fibre, planned, arguments.settle, arguments.as_measured, arguments.live)
-        for path, made in zip(paths, answers(*asked), strict=True):
+        asked = (protocol, fibre, planned, arguments.settle, arguments.as_measured, arguments.live, lacking)
+        for made in answers(*asked):
+            path = bag_path(arguments.out, arguments.prefix, made.trial)
             assert made.simulated is not None  # a model's answer
             write_trial(path, made.trial, made.simulated)
             if line := pushing(made.trial, made.simulated, fibre.model):
@@ -82,9 +84,12 @@ def run(arguments: argparse.Namespace) -> int:
             runs.append(made)
     for line in one_for_all(pushed):
         common.warn(line)
+    for line in lacking:
+        common.warn(line)
     if told:
         found = protocol.analyse(fibre.name, fibre.model, runs)
-        for note in found.notes:
+        found = replace(found, notes=(*lacking, *found.notes))
+        for note in found.notes[len(lacking) :]:
             common.warn(note)
         print(ProtocolResult(protocol.name, (found,)))
         remove_results(report.older_results(arguments.out, protocol))

@@ -23,6 +23,12 @@ from xb_muscle_ros.trials.simulated import Simulated
 from xb_muscle_ros.trials.trial import Array, Trial
 
 MEASURED = "measured"
+
+
+class NoAnswer(UserError):
+    """A model has no answer to a trial; it may have one to others."""
+
+
 Cell = Estimate | float | str | None
 
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from xb_muscle_ros.errors import naming
+from xb_muscle_ros.errors import StateViolation, UserError, naming
 from xb_muscle_ros.models.clamping import clamp_run
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.protocols import force_velocity_curve as curve
-from xb_muscle_ros.protocols.base import Cell, Column, Found, Option, Planned, Protocol, Run, Settings, run_of
+from xb_muscle_ros.protocols.base import Cell, Column, Found, NoAnswer, Option, Planned, Protocol, Run, Settings, run_of
 from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
 from xb_muscle_ros.scores.clamp import ClampWindow, clamp_window, velocity
 from xb_muscle_ros.scores.estimate import Estimate, Missing
@@ -24,6 +24,8 @@ from xb_muscle_ros.trials.stamps import to_ns
 from xb_muscle_ros.trials.trial import Trial
 
 CLAMP = "clamp"
+# Length that changes by less stays as it is, L0.
+_MOVED_L0 = 2e-3
 
 
 class ForceClamps(Protocol):
@@ -70,7 +72,7 @@ class ForceClamps(Protocol):
         load = planned.trial.facts.setting("load")
         assert load is not None  # planned above
         phase = planned.trial.phases_by_name()[CLAMP]
-        return _under_load(muscle, planned.trial, phase.start_s, None, load, settle_s)
+        return _under_load(muscle, planned.trial, (phase.start_s, None), phase.start_s, load, settle_s)
 
     def repeat(self, muscle: Muscle, trial: Trial, settle_s: float | None = None) -> Run:
         """The recorded length up to the clamp, then the recorded load, as a share of the recorded isometric force."""
@@ -78,7 +80,8 @@ class ForceClamps(Protocol):
         before = isometric_force(trial, trial.force_time_s, trial.measured_f0)
         if isinstance(found, Missing) or not before.value:
             return super().repeat(muscle, trial, settle_s)
-        return _under_load(muscle, trial, found.start_s, found.end_s, found.load_f0 / before.value, settle_s)
+        moves_s = _still_until(trial)
+        return _under_load(muscle, trial, (found.start_s, found.end_s), moves_s, found.load_f0 / before.value, settle_s)
 
     def analyse(self, fibre: str, of: str, runs: Sequence[Run]) -> Found:
         """Velocity in the window of each trial, and Hill's hyperbola through them."""
@@ -99,17 +102,32 @@ class ForceClamps(Protocol):
         return curve.SIZE_MM
 
 
+def _still_until(trial: Trial) -> float:
+    """When length first moves: a quick release may bring the muscle to its load, and force is isometric before it."""
+    moved = np.flatnonzero(np.abs(trial.length_change_l0 - trial.length_change_l0[0]) > _MOVED_L0)
+    return float(trial.time_s[max(int(moved[0]) - 1, 0)]) if moved.size else float(trial.time_s[-1])
+
+
 def _under_load(
-    muscle: Muscle, trial: Trial, start_s: float, end_s: float | None, load: float, settle_s: float | None
+    muscle: Muscle,
+    trial: Trial,
+    between_s: tuple[float, float | None],
+    isometric_s: float,
+    load: float,
+    settle_s: float | None,
 ) -> Run:
     """A trial whose length follows from a load from one time on; the rest of a record after the load is left out.
 
     Args:
-        load: over the model's isometric force where the load begins.
+        between_s: begin and end of the load, s; None for the end of the trial.
+        isometric_s: when, at the latest, the model's force is the isometric one, s.
+        load: over that force.
 
     Raises:
-        UserError, StateViolation: see `Muscle.run` and `clamp_run`; names the trial.
+        NoAnswer: there is no length at which the fibre bears the load; names the trial.
+        UserError, StateViolation: see `Muscle.run`; names the trial.
     """
+    start_s, end_s = between_s
     last = trial.time_s.size if end_s is None else int(np.searchsorted(trial.time_s, end_s + 5e-10, side="right"))
     k = max(int(np.searchsorted(trial.time_s, start_s - 5e-10)), 1)
     calcium, dt_s = calcium_per_step(trial)[:last], np.diff(to_ns(trial.time_s[:last])) / 1e9
@@ -117,8 +135,14 @@ def _under_load(
     with naming(f"trial {trial.facts.trial}"):
         state = muscle.settle(float(length[0]), float(calcium[0]), settle_s)
         before = muscle.run(state, dt_s[:k], length[: k + 1], calcium[: k + 1])
-        level = load * muscle.outputs(before[-1]).force_f0
-        after = clamp_run(muscle, before[-1], dt_s[k:], np.full(last - k, level), calcium[k:])
+        still = min(int(np.searchsorted(trial.time_s, isometric_s + 5e-10, side="right")) - 1, k)
+        level = load * muscle.outputs(before[still]).force_f0
+        try:
+            after = clamp_run(muscle, before[-1], dt_s[k:], np.full(last - k, level), calcium[k:])
+        except StateViolation:
+            raise
+        except UserError as problem:
+            raise NoAnswer(str(problem)) from problem
     states = np.concatenate([before[:-1], after])
     facts = trial.facts
     if facts.setting("load") is not None:

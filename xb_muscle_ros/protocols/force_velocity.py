@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.protocols import force_velocity_curve as curve
@@ -18,8 +19,12 @@ from xb_muscle_ros.scores.readout import isometric_force
 from xb_muscle_ros.trials.protocol import ALLOWED, Allowed
 from xb_muscle_ros.trials.trial import Phase
 
+Bools = npt.NDArray[np.bool_]
+
 # Force is read where length passes the middle of the ramp: a mean over this share of its duration.
 _SHARE = 0.05
+# Force that changes by more than this share in the last fifth of the way to the middle of the ramp is not steady.
+_STEADY = 0.03
 _MOVING = ("stretch", "shortening", "release", "test_stretch")
 
 
@@ -117,8 +122,27 @@ def _row(run: Run) -> tuple[Mapping[str, Cell], str]:
     if not np.any(inside):
         inside = np.arange(run.time_s.size) == int(np.argmin(np.abs(run.time_s - middle)))
     se = None if run.noise is None else run.noise.of_mean(run.time_s[inside])
+    why = "" if before.value is not None else f"isometric force: {before.why}"
+    still = _changes(run, phase, inside, se or 0.0)
+    if not why and still > _STEADY:
+        why = (
+            f"force: it still changes at the middle of the ramp (by {100.0 * still:.0f} % in the fifth of the way "
+            "before it); a larger --amplitude, or a longer ramp of a recording, gives it time"
+        )
     force = Estimate(float(np.mean(run.force_f0[inside])), se)
     assert force.value is not None
     power = Estimate(-speed * force.value, None if se is None else abs(speed) * se)
     row |= {"shortening_l0_per_s": -speed, "force_f0": force, "power_f0_l0_per_s": power}
-    return row | {"load": quotient(force, before)}, f"isometric force: {before.why}" if before.value is None else ""
+    return row | {"load": quotient(force, before)}, why
+
+
+def _changes(run: Run, ramp: Phase, middle: Bools, se_f0: float) -> float:
+    """How much force changes, beyond noise, from 0.4 of the ramp to its middle, as a share of that there."""
+    at_s = ramp.start_s + 0.4 * (ramp.end_s - ramp.start_s)
+    half_s = 0.5 * _SHARE * (ramp.end_s - ramp.start_s)
+    earlier = np.abs(run.time_s - at_s) <= half_s + 5e-10
+    if not np.any(earlier):
+        return 0.0
+    force = float(np.mean(run.force_f0[middle]))
+    apart = abs(float(np.mean(run.force_f0[earlier])) - force) - 3.0 * np.sqrt(2.0) * se_f0
+    return float(max(apart, 0.0) / max(abs(force), 1e-6))

@@ -64,7 +64,7 @@ def found_of(
 def _numbers_of(
     load: Array, velocity_l0_per_s: Array, isometric_f0: float, load_is_given: bool
 ) -> tuple[dict[str, Number], dict[str, Curve], list[str]]:
-    """Numbers of `NUMBERS`, the curve (load, velocity), and notes.
+    """Numbers of `NUMBERS`, the curves ``hill`` (load, velocity) and ``power`` (load, F0·L0/s), and notes.
 
     Args:
         load: force over the isometric force, shape (n,).
@@ -84,7 +84,13 @@ def _numbers_of(
         "load_at_power": Number(found.load_at_power),
         "rmsd": Number(found.rmsd),
     }
-    return numbers, {"hill": Curve(x, hill_velocity(x, found.a, found.vmax_l0_per_s))}, []
+    speed = hill_velocity(x, found.a, found.vmax_l0_per_s)
+    told = [
+        f"{NUMBERS[key].text}: the 95 % interval goes down to 0 or below; these points do not tell it"
+        for key in ("vmax_l0_per_s", "a_over_f0")
+        if (low := numbers[key].low) is not None and low <= 0.0
+    ]
+    return numbers, {"hill": Curve(x, speed), "power": Curve(x, x * speed * isometric_f0)}, told
 
 
 def draw(figure: Any, found: Sequence[Found], traces: str) -> None:
@@ -106,8 +112,7 @@ def draw(figure: Any, found: Sequence[Found], traces: str) -> None:
         if "hill" in each.curves:
             curve = each.curves["hill"]
             velocity.plot(curve.x, curve.y, **look.curve)
-            isometric = float(np.nanmedian(each.column("isometric_f0")))
-            power.plot(curve.x, curve.x * curve.y * isometric, **look.curve)
+            power.plot(*each.curves["power"], **look.curve)
     record.set(
         xlabel=f"time from the begin of the {'clamp' if traces == 'length' else 'ramp'} (s)",
         ylabel="length change (% L$_0$)" if traces == "length" else "force (F$_0$)",

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
-from xb_muscle_ros.protocols.base import MEASURED, Found, Planned, Protocol, Run, measured
+from xb_muscle_ros.protocols.base import MEASURED, Found, NoAnswer, Planned, Protocol, Run, measured
 from xb_muscle_ros.trials.trial import Trial
 
 
@@ -17,18 +18,43 @@ def answers(
     planned: Sequence[Planned],
     settle_s: float | None = None,
     as_measured: bool = False,
+    lacking: list[str] | None = None,
 ) -> Iterator[Run]:
     """The planned trials through a model, one after the other.
 
     Args:
         as_measured: the force counts as measured.
+        lacking: gets a line for each trial to which the model has no answer, where it has one to others.
 
     Raises:
         UserError, StateViolation: see `Protocol.answer`.
     """
     muscle = Muscle(fibre)
-    for each in planned:
-        yield with_force(protocol.answer(muscle, each, settle_s), fibre, as_measured)
+    asked = (partial(protocol.answer, muscle, each, settle_s) for each in planned)
+    for run in _answered(asked, lacking):
+        yield with_force(run, fibre, as_measured)
+
+
+def _answered(asked: Iterable[Callable[[], Run]], lacking: list[str] | None) -> Iterator[Run]:
+    """Answers that there are.
+
+    Raises:
+        NoAnswer: there is none at all, or none for one of them and no `lacking`.
+    """
+    last, any_answer = None, False
+    for ask in asked:
+        try:
+            run = ask()
+        except NoAnswer as problem:
+            if lacking is None:
+                raise
+            lacking.append(f"{problem}; the trial is left out")
+            last = problem
+            continue
+        any_answer = True
+        yield run
+    if last is not None and not any_answer:
+        raise last
 
 
 def with_force(run: Run, fibre: Fibre, as_measured: bool) -> Run:
@@ -61,5 +87,7 @@ def read_model(protocol: Protocol, fibre: Fibre, trials: Sequence[Trial], settle
         UserError, StateViolation: see `Protocol.repeat`.
     """
     muscle = Muscle(fibre)
-    runs = [protocol.repeat(muscle, trial, settle_s) for trial in trials]
-    return protocol.analyse(trials[0].facts.fibre, fibre.model, runs)
+    lacking: list[str] = []
+    asked = (partial(protocol.repeat, muscle, trial, settle_s) for trial in trials)
+    found = protocol.analyse(trials[0].facts.fibre, fibre.model, list(_answered(asked, lacking)))
+    return replace(found, notes=(*lacking, *found.notes))
