@@ -26,7 +26,9 @@ def number(value: float | None, form: str = ".3f", factor: float = 1.0) -> str:
     """A number times a factor; a dash for None and NaN."""
     if value is None or not math.isfinite(value):
         return NOTHING
-    return format(value if factor == 1.0 else factor * value, form)
+    text = format(value if factor == 1.0 else factor * value, form)
+    # What is rounded to zero has no sign.
+    return text.removeprefix("-") if not text.strip("-0.") else text
 
 
 def error_text(se: float | None, factor: float = 1.0) -> str:

@@ -68,3 +68,19 @@ def test_measured_fibre(shared_data: Path, repo_root: Path, tmp_path: Path) -> N
     by_pca = {row["pca"]: row["k_tr_per_s"] for row in found.rows}
     assert by_pca[4.5].value == pytest.approx(5.5, abs=0.1)
     assert by_pca[6.6].value == pytest.approx(1.27, abs=0.02)
+
+
+def test_the_error_of_k_tr_does_not_grow_as_noise_falls() -> None:
+    """What one exponential misses was taken for noise that is never forgotten: 7 ± 8 1/s without any noise."""
+    made = xb.run_protocol("ktr", "18Dec2017a", pca=[4.5, 6.1], as_measured=True, tell=lambda line: None)
+    (found,) = xb.analyse_protocol("ktr", made, tell=lambda line: None).results
+    assert np.all(found.errors("k_tr_per_s") < 0.1)
+    (trial, _), values, errors = made.trials, [], []
+    for seed in range(10):
+        noise = 1e-2 * np.random.default_rng(seed).standard_normal(trial.force_n.size)
+        (one,) = xb.analyse_protocol(
+            "ktr", [replace(trial, force_n=trial.force_n + noise)], tell=lambda _: None
+        ).results
+        values.append(one.column("k_tr_per_s")[0])
+        errors.append(one.errors("k_tr_per_s")[0])
+    assert 0.8 * np.std(values) < np.median(errors) < 5.0 * np.std(values)

@@ -36,8 +36,8 @@ def test_t1_t2_rates_and_stiffness_come_out() -> None:
         assert row["size_l0"] == pytest.approx(size, abs=1e-9)
         assert row["t1_f0"].value == pytest.approx(1.0 + STIFFNESS * size, abs=1e-6)
         assert row["t2_f0"].value == pytest.approx(1.0 + 0.6 * STIFFNESS * size, abs=1e-6)
-        assert row["quick_per_s"] == pytest.approx(700.0, rel=1e-4)
-        assert row["slow_per_s"] == pytest.approx(15.0, rel=1e-4)
+        assert row["quick_per_s"].value == pytest.approx(700.0, rel=1e-4)
+        assert row["slow_per_s"].value == pytest.approx(15.0, rel=1e-4)
     assert found.numbers["stiffness_f0_per_l0"].value == pytest.approx(STIFFNESS, rel=1e-6)
     assert found.numbers["y0_l0"].value == pytest.approx(1.0 / STIFFNESS, rel=1e-6)
 
@@ -72,3 +72,60 @@ def test_a_ramp_is_no_step() -> None:
     made = xb.simulate("18Dec2017a", amplitude=0.0, as_measured=True)
     (found,) = xb.analyse_protocol("step", made, tell=lambda line: None).results
     assert "there is no single step that takes 5 ms or less" in found.notes[0]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"rate": 1000.0},
+        {"rate": 2000.0},
+        {"rate": 7000.0},
+        {"rate": 12000.0},
+        {"lead": 0.01003},
+        {"step_time": 0.00013},
+    ],
+)
+def test_stiffness_does_not_depend_on_where_samples_are(options: dict[str, float]) -> None:
+    """A step between two samples was read off a straight line between them: 152 F0/L0 at 1 kHz."""
+    (found,) = xb.run_protocol("step", "18Dec2017a", tell=lambda line: None, **options).results
+    (usual,) = xb.run_protocol("step", "18Dec2017a", tell=lambda line: None).results
+    assert found.column("size_l0") == pytest.approx(usual.column("size_l0"), abs=1e-12)
+    stiffness, y0 = (found.numbers[key].value for key in ("stiffness_f0_per_l0", "y0_l0"))
+    # A quicker step is a little stiffer.
+    assert stiffness == pytest.approx(usual.numbers["stiffness_f0_per_l0"].value, rel=0.005)
+    assert y0 == pytest.approx(usual.numbers["y0_l0"].value, rel=0.005)
+
+
+def test_a_first_sample_that_comes_late_is_told() -> None:
+    trial = recorded(-0.01)
+    end_s = trial.facts.phases[1].end_s
+    kept = (trial.time_s < end_s - 3e-4) | (trial.time_s > end_s + 4.2e-4)
+    late = replace(
+        trial, time_s=trial.time_s[kept], length_m=trial.length_m[kept], force_time_s=trial.force_time_s[kept],
+        force_n=trial.force_n[kept],
+    )  # fmt: skip
+    (found,) = xb.analyse_protocol("step", [late], tell=lambda line: None).results
+    assert any("it is that of the first sample, 0.45 ms after the step" in note for note in found.notes)
+
+
+def test_noise_makes_no_quick_phase() -> None:
+    """The model has none; noise of 0.1 % F0 made one in half of the steps, with rates up to 50,000 1/s."""
+    made = xb.run_protocol("step", "18Dec2017a", lead=0.1, as_measured=True, tell=lambda line: None)
+    found = 0
+    for seed in range(6):
+        random = np.random.default_rng(seed)
+        noisy = [replace(t, force_n=t.force_n + 1e-3 * random.standard_normal(t.force_n.size)) for t in made.trials]
+        (each,) = xb.analyse_protocol("step", noisy, tell=lambda line: None).results
+        found += sum("t2_f0" in row for row in each.rows)
+    assert found <= 2  # of 48
+
+
+def test_what_leads_away_or_is_all_there_is_is_no_quick_phase() -> None:
+    trial = recorded(-0.01)
+    end_s = trial.facts.phases[1].end_s
+    since = trial.time_s - end_s
+    falling = np.where(since < -1e-9, 1.0, 0.6 + 0.1 * np.exp(-700.0 * since) - 0.1 * np.exp(-15.0 * since))
+    (found,) = xb.analyse_protocol("step", [replace(trial, force_n=falling)], tell=lambda line: None).results
+    assert "t2_f0" not in found.rows[0]
+    (found,) = xb.run_protocol("step", "18Dec2017a", window=0.5, size=0.002, tell=lambda line: None).results
+    assert "t2_f0" not in found.rows[0]

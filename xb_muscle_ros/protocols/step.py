@@ -12,17 +12,19 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.protocols.base import Cell, Column, Curve, Found, Number, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.figures import legend, lettered, looks
 from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
-from xb_muscle_ros.scores.estimate import Estimate, Missing, notes_of
-from xb_muscle_ros.scores.quick_recovery import quick_recovery
+from xb_muscle_ros.scores.estimate import Missing, notes_of
+from xb_muscle_ros.scores.quick_recovery import first_after, quick_recovery
 from xb_muscle_ros.scores.readout import isometric_force
 from xb_muscle_ros.trials.protocol import ALLOWED, Allowed
-from xb_muscle_ros.trials.trial import Array
+from xb_muscle_ros.trials.trial import Trial
 
 # A recording's motor takes longer than the fastest step; what takes longer than this is a ramp.
 _LONGEST_S = 0.005
 # T1 is a straight line for steps as small as this (Ford, Huxley and Simmons 1977: about ± 3 nm in a half-sarcomere of
 # 1.1 µm); beyond it the fibre is stiffer when stretched and slack when released.
 _SMALL_L0 = 0.003
+# What T1 is read so long after the step is told, s: a quick phase has begun.
+_LATE_S = 1e-4
 
 
 class QuickSteps(Protocol):
@@ -69,6 +71,8 @@ class QuickSteps(Protocol):
             UserError: a size is zero.
         """
         step_s, window, lead, rate = (settings[k][0] for k in ("step-time", "window", "lead", "rate"))
+        # The end of the step is a sample: T1 is force there.
+        lead = float(np.ceil((lead + step_s) * rate - 1e-6)) / rate - step_s
         planned = []
         for pca, size in itertools.product(settings["pca"], settings["size"]):
             if size == 0.0:
@@ -86,9 +90,9 @@ class QuickSteps(Protocol):
         rows: list[Mapping[str, Cell]] = []
         told = []
         for run in runs:
-            row, why = _row(run)
+            row, whys = _row(run)
             rows.append(row)
-            told += [(run.trial.facts.trial, why)] if why else []
+            told += [(run.trial.facts.trial, why) for why in whys]
         found = Found(fibre, of, tuple(rows), runs=tuple(runs), notes=tuple(notes_of(told)))
         numbers, curves, more = _line(found)
         return Found(fibre, of, found.rows, numbers, curves, found.runs, (*found.notes, *more))
@@ -130,31 +134,39 @@ def _step(run: Run) -> tuple[float, float] | None:
     return (quick[0].start_s, quick[0].end_s) if len(quick) == 1 else None
 
 
-def _row(run: Run) -> tuple[Mapping[str, Cell], str]:
-    """A row, and why it lacks T1 or T2."""
+def _row(run: Run) -> tuple[Mapping[str, Cell], list[str]]:
+    """A row, and why it lacks T1 or T2, or may be off."""
     facts = run.trial.facts
     before = isometric_force(run.trial, run.time_s, run.force_f0, run.noise)
     row: dict[str, Cell] = {"trial": facts.trial, "pca": facts.pca, "isometric_f0": before}
     step = _step(run)
     if step is None:
-        return row, f"step: there is no single step that takes {1e3 * _LONGEST_S:g} ms or less"
+        return row, [f"step: there is no single step that takes {1e3 * _LONGEST_S:g} ms or less"]
     start_s, end_s = step
-    begin, moved = np.interp([start_s, end_s], run.trial.time_s, run.trial.length_change_l0)
-    row |= {"size_l0": float(moved - begin), "step_s": end_s - start_s}
+    size = run.setting("size_l0")
+    size = _size(run.trial, start_s, end_s) if size is None else size
+    t1 = first_after(run.time_s, run.force_f0, end_s, run.noise)
+    row |= {"size_l0": size, "step_s": end_s - start_s, "t1_f0": t1}
+    late_s = float(run.time_s[min(int(np.searchsorted(run.time_s, end_s - 5e-10)), run.time_s.size - 1)]) - end_s
+    told = [f"T1: it is that of the first sample, {1e3 * late_s:.2g} ms after the step"] if late_s > _LATE_S else []
     window_s = run.setting("window_s") or min(0.05, float(run.time_s[-1]) - end_s)
-    found = quick_recovery(run.time_s, run.force_f0, start_s, end_s, window_s, run.noise)
+    found = quick_recovery(run.time_s, run.force_f0, end_s, window_s, size, run.noise)
     if isinstance(found, Missing):
-        return row | {"t1_f0": _at(run.time_s, run.force_f0, end_s)}, f"T2: {found.why}"
+        return row, [*told, f"T2: {found.why}"]
     return row | {
         "t1_f0": found.t1_f0,
         "t2_f0": found.t2_f0,
         "quick_per_s": found.quick_per_s,
         "slow_per_s": found.slow_per_s,
-    }, ""
+    }, told
 
 
-def _at(time_s: Array, force_f0: Array, at_s: float) -> Estimate:
-    return Estimate(float(np.interp(at_s, time_s, force_f0)))
+def _size(trial: Trial, start_s: float, end_s: float) -> float:
+    """How far length is from where it was, at the first sample after a step, L0."""
+    before = max(int(np.searchsorted(trial.time_s, start_s + 5e-10, side="right")) - 1, 0)
+    after = min(int(np.searchsorted(trial.time_s, end_s - 5e-10)), trial.time_s.size - 1)
+    length = trial.length_change_l0
+    return float(length[after] - length[before])
 
 
 def _line(found: Found) -> tuple[dict[str, Number], dict[str, Curve], list[str]]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from xb_muscle_ros.protocols.base import Cell, Column, Found, Option, Planned, Protocol, Run, Settings
+from xb_muscle_ros.protocols.base import MEASURED, Cell, Column, Found, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.calcium import transient_of, transient_options
 from xb_muscle_ros.protocols.figures import legend, lettered, looks
 from xb_muscle_ros.protocols.inputs import facts_of, rate_option
 from xb_muscle_ros.protocols.stimulation import begun_s, stimulated
-from xb_muscle_ros.scores.estimate import Missing, notes_of
+from xb_muscle_ros.scores.estimate import Estimate, Missing, notes_of
+from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN
 from xb_muscle_ros.scores.twitch import twitch
 from xb_muscle_ros.trials.protocol import ALLOWED
 
@@ -53,20 +54,22 @@ class Twitches(Protocol):
     def analyse(self, fibre: str, of: str, runs: Sequence[Run]) -> Found:
         """Times of each contraction."""
         rows: list[Mapping[str, Cell]] = []
-        notes = []
+        notes, unknown = [], 0
         for run in runs:
             name = run.trial.facts.trial
             pulse_s, guessed = begun_s(run)
             notes += [(name, f"pulse: {guessed}")] if guessed else []
-            found = twitch(run.time_s, run.force_f0, pulse_s)
+            found = twitch(run.time_s, run.force_f0, pulse_s, run.noise)
             if isinstance(found, Missing):
                 rows.append({"trial": name})
                 notes.append((name, f"twitch: {found.why}"))
                 continue
             rows.append({"trial": name, **found._asdict()})
-            if found.half_relaxation_s is None:
-                notes.append((name, "half relaxation: force does not fall to half of its peak within the record"))
-        return Found(fibre, of, tuple(rows), runs=tuple(runs), notes=tuple(notes_of(notes)))
+            if found.half_relaxation_s.value is None:
+                notes.append((name, f"half relaxation: {found.half_relaxation_s.why}"))
+            unknown += of == MEASURED and run.noise is None
+        lines = notes_of(notes) + ([f"{NO_NOISE_KNOWN} ({unknown} of {len(rows)})"] if unknown else [])
+        return Found(fibre, of, tuple(rows), runs=tuple(runs), notes=tuple(lines))
 
     def draw(self, figure: Any, found: Sequence[Found]) -> None:
         """Calcium and force against time, and force over its peak."""
@@ -82,8 +85,8 @@ class Twitches(Protocol):
                 )
                 force.plot(since_ms, run.force_f0, **look.trace)
                 peak, rest = row.get("peak_f0"), row.get("rest_f0")
-                if isinstance(peak, float) and isinstance(rest, float):
-                    relative.plot(since_ms, (run.force_f0 - rest) / peak, **look.trace)
+                if isinstance(peak, Estimate) and isinstance(rest, Estimate) and peak.value and rest.value is not None:
+                    relative.plot(since_ms, (run.force_f0 - rest.value) / peak.value, **look.trace)
         calcium.set_ylabel("free calcium (µM)")
         force.set_ylabel("force (F$_0$)")
         relative.set_ylabel("force above rest over its peak")

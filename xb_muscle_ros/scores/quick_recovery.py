@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import curve_fit
+from scipy.optimize import least_squares
 
 from xb_muscle_ros.scores.estimate import Estimate, Missing, rounded, samples
 from xb_muscle_ros.scores.standard_error import ForceNoise
@@ -18,8 +19,13 @@ _LEAST_F0 = 1e-6
 _APART = 2.0
 # A quick phase of a smaller share of what force does in the window is the slow one's departure from an exponential.
 _SMALLEST = 0.02
-# Rates of the quick phase that fits begin with, over one over the window.
-_STARTS = (10.0, 30.0, 100.0)
+# Rates of both phases that fits begin with, over one over the window.
+_STARTS, _SLOW_STARTS = (10.0, 30.0, 100.0), (0.3, 3.0)
+# Slowest and fastest slow phase over one over the window; where it is the slowest, and so no phase, a quick phase is
+# at least so fast.
+_SLOW, _QUICK_ALONE = (0.01, 30.0), 10.0
+# The amplitude of a quick phase of a measured force is at least so many standard errors: its rate is not known before.
+_SURE = 4.0
 
 
 class QuickRecovery(NamedTuple):
@@ -35,14 +41,14 @@ class QuickRecovery(NamedTuple):
 
     t1_f0: Estimate
     t2_f0: Estimate
-    quick_per_s: float
-    slow_per_s: float
+    quick_per_s: Estimate
+    slow_per_s: Estimate
     at_s: Array
     fitted: Array
 
 
 def quick_recovery(
-    time_s: Array, force_f0: Array, start_s: float, end_s: float, window_s: float, noise: ForceNoise | None = None
+    time_s: Array, force_f0: Array, end_s: float, window_s: float, size_l0: float, noise: ForceNoise | None = None
 ) -> QuickRecovery | Missing:
     """T1, and T2 by two exponentials through the force after the step.
 
@@ -52,12 +58,14 @@ def quick_recovery(
 
     Args:
         time_s, force_f0: shape (n,), s and F0.
-        start_s, end_s: of the step, s.
+        end_s: of the step, s.
         window_s: what is fitted, from the end of the step on, s.
+        size_l0: of the step: what recovers quickly goes back from where it led.
         noise: of the force; None for simulated force.
 
     Returns:
-        nothing where fewer than 12 samples lie in the window or two phases cannot be distinguished.
+        nothing where fewer than 12 samples lie in the window, two phases cannot be distinguished, or the quick one is
+        within its errors.
     """
     inside = (time_s >= end_s - 5e-10) & (time_s <= end_s + window_s + 5e-10)
     t, force = time_s[inside] - end_s, force_f0[inside]
@@ -65,39 +73,69 @@ def quick_recovery(
         return Missing(f"{samples(t.size)} in {1e3 * window_s:g} ms after the step; {FEWEST} are needed")
     if np.ptp(force) < _LEAST_F0:
         return Missing("force does not recover")
-    t1 = Estimate(float(force[0]), None if noise is None else noise.of_mean(time_s[inside][:1]))
+    none = f"no quick phase can be told from the slow one in the {1e3 * window_s:g} ms after the step"
     found = _fitted(t, force)
-    if found is None:
-        return Missing(f"no quick phase can be told from the slow one in the {1e3 * window_s:g} ms after the step")
-    end, _, slow, k_quick, k_slow = (float(value) for value in found)
-    se = None
+    if found is None or found[1] * size_l0 <= 0.0:
+        return Missing(none)
+    end, quick, slow, k_quick, k_slow = (float(value) for value in found)
+    errors: list[float | None] = [None] * 3
     if noise is not None:
+        # Of the quick phase's amplitude, of T2, and of both rates.
         weights = np.linalg.pinv(_slopes(t, *found))
-        se = noise.of_sum(weights[0] + weights[2], time_s[inside])
-    return QuickRecovery(
-        t1, Estimate(end + slow, None if se is None else rounded(se)), k_quick, k_slow, t, _curve(t, *found)
-    )
+        sums = weights[1], weights[0] + weights[2], weights[3], weights[4]
+        of_quick, *known = (noise.of_sum(each, time_s[inside]) for each in sums)
+        errors = [rounded(each) for each in known]
+        if abs(quick) < _SURE * of_quick:
+            return Missing(f"{none} (amplitude {quick:.2g} ± {of_quick:.1g} F0)")
+    t1 = first_after(time_s, force_f0, end_s, noise)
+    t2, of_quick_rate, of_slow_rate = map(Estimate, (end + slow, k_quick, k_slow), errors)
+    return QuickRecovery(t1, t2, of_quick_rate, of_slow_rate, t, _curve(t, *found))
+
+
+def first_after(time_s: Array, force_f0: Array, end_s: float, noise: ForceNoise | None = None) -> Estimate:
+    """Force of the first sample at the end of a step or after it, F0."""
+    first = min(int(np.searchsorted(time_s, end_s - 5e-10)), time_s.size - 1)
+    se = None if noise is None else noise.of_mean(time_s[first : first + 1])
+    return Estimate(float(force_f0[first]), se)
 
 
 def _fitted(t: Array, force: Array) -> Array | None:
-    """Best of fits from several starts; None where none has two phases that are of any size."""
+    """Best of fits from several starts; None where it has no two phases that are of any size.
+
+    Level and amplitudes follow from the rates (variable projection: Golub and Pereyra 1973).
+    """
     span = float(t[-1])
-    lower = [-np.inf, -np.inf, -np.inf, 0.1 / span, 0.01 / span]
-    upper = [np.inf, np.inf, np.inf, 10.0 / float(t[1]), 30.0 / span]
+    # Of what is over within two samples nothing is known.
+    fastest = max(0.5 / float(np.median(np.diff(t))), 0.2 / span)
+    lower = np.log([0.1 / span, _SLOW[0] / span])
+    upper = np.log([fastest, _SLOW[1] / span])
+
+    def amplitudes(rates: Array) -> Array:
+        found: Array = np.linalg.lstsq(_basis(t, *np.exp(rates)), force, rcond=None)[0]
+        return found
+
+    def left(rates: Array) -> Array:
+        rest: Array = _basis(t, *np.exp(rates)) @ amplitudes(rates) - force
+        return rest
+
     best: tuple[float, Array] | None = None
-    for quick in _STARTS:
-        begin = (quick / span, 2.0 / span)
-        basis = np.column_stack([np.ones_like(t), *(np.exp(-rate * t) for rate in begin)])
-        level = np.linalg.lstsq(basis, force, rcond=None)[0]
-        try:
-            found, _ = curve_fit(_curve, t, force, p0=(*level, *begin), bounds=(lower, upper), max_nfev=2000)
-        except (RuntimeError, ValueError):
-            continue
-        rss = float(np.sum((_curve(t, *found) - force) ** 2))
-        two = found[3] >= _APART * found[4] and abs(found[1]) > _SMALLEST * float(np.ptp(force))
-        if two and (best is None or rss < best[0]):
-            best = (rss, found)
-    return None if best is None else best[1]
+    for quick, slow in itertools.product(_STARTS, _SLOW_STARTS):
+        start = np.clip(np.log([quick / span, slow / span]), lower + 1e-6, upper - 1e-6)
+        fit = least_squares(  # type: ignore[operator]  # the stubs take the module of this name for it
+            left, start, bounds=(lower, upper), xtol=1e-13, ftol=1e-13, gtol=1e-15, max_nfev=60
+        )
+        if best is None or fit.cost < best[0]:
+            best = (float(fit.cost), fit.x)
+    assert best is not None
+    k_quick, k_slow = np.exp(best[1])
+    found = np.array([*amplitudes(best[1]), k_quick, k_slow])
+    two = k_quick >= _APART * k_slow and abs(found[1]) > _SMALLEST * float(np.ptp(force))
+    alone = best[1][1] < lower[1] + 0.01
+    return found if two and (not alone or k_quick >= _QUICK_ALONE / span) else None
+
+
+def _basis(t: Array, k_quick: float, k_slow: float) -> Array:
+    return np.column_stack([np.ones_like(t), np.exp(-k_quick * t), np.exp(-k_slow * t)])
 
 
 def _curve(t: Array, end: float, quick: float, slow: float, k_quick: float, k_slow: float) -> Array:

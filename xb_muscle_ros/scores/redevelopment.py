@@ -8,8 +8,6 @@ import numpy as np
 from scipy.optimize import curve_fit
 
 from xb_muscle_ros.scores.estimate import Estimate, Missing
-from xb_muscle_ros.scores.noise.pieces import Piece, evenly_sampled
-from xb_muscle_ros.scores.noise.trials import by_curves
 from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.hum import hum
 from xb_muscle_ros.trials.trial import Array, Trial
@@ -22,6 +20,8 @@ _BACK = 0.1
 # not before the slack is taken up and the motor has come to rest.
 _REST_S = 0.005
 _LOWEST_WITHIN_S = 0.1
+# Rate, begin and end.
+_FITTED = 3
 # What is over within the time waited is no redevelopment.
 _FASTEST_PER_S = 1.0 / _REST_S
 # Length that strays further from where it is held is a movement.
@@ -145,11 +145,9 @@ def redevelopment(
     weights = np.linalg.pinv(_slopes(since, *found))[0]
     step_s = float(np.mean(np.diff(t)))
     lines, rest = hum(step_s, residual)
-    curve, _ = np.linalg.qr(_slopes(since, *found))
-    beside = by_curves({"": [Piece(t, rest, curve)]}, {"": evenly_sampled(t)})
-    se = ForceNoise.of_models(beside[""], step_s, lines).of_sum(weights, t)
+    se = ForceNoise(lambda lags_s: _autocovariance(rest, lags_s / step_s), step_s, lines).of_sum(weights, t)
     if noise is not None:
-        se = max(se, noise.of_sum(weights, t))
+        se = max(se, noise.of_sum(weights, t) * _borne_out(noise, _slopes(since, *found), t, residual))
     return Redevelopment(
         k_per_s=float(found[0]),
         se_per_s=se,
@@ -159,6 +157,33 @@ def redevelopment(
         from_s=float(t[0]),
         to_s=float(t[-1]),
     )
+
+
+def _borne_out(noise: ForceNoise, slopes: Array, time_s: Array, residual: Array) -> float:
+    """How large the residual is beside what the noise would leave of itself around a fitted curve; 1 at most.
+
+    A short quiet time cannot rule slow noise out; a longer record without it can.
+    """
+    fitted, _ = np.linalg.qr(slopes)
+    gamma = noise.autocovariance(time_s)[0]
+    left = gamma - float(np.trace(noise.covariance(fitted, time_s))) / time_s.size
+    return float(min(1.0, np.sqrt(np.mean(residual**2) / left))) if left > 0.0 else 1.0
+
+
+def _autocovariance(rest: Array, lags: Array) -> Array:
+    """Of what the curve leaves, at lags in samples, F0²: as it is there, up to where it is forgotten.
+
+    What one exponential misses of a muscle's rise is smooth. A model of noise takes that for noise that is never
+    forgotten; here it counts for as long as it resembles itself.
+    """
+    n = rest.size
+    spectrum = np.abs(np.fft.rfft(rest - np.mean(rest), 2 * n)) ** 2
+    gamma = np.fft.irfft(spectrum)[:n] / max(n - _FITTED, 1)
+    gone = np.flatnonzero(gamma <= 0.0)
+    # Bartlett's window, which leaves no sum with a variance below zero.
+    reach = 2 * int(gone[0]) if gone.size else n
+    found: Array = np.interp(lags, np.arange(n), gamma * np.maximum(1.0 - np.arange(n) / reach, 0.0))
+    return found
 
 
 def _rise(since_s: Array, k: float, start: float, end: float) -> Array:

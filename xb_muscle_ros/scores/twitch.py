@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from xb_muscle_ros.scores.estimate import Missing
+from xb_muscle_ros.scores.estimate import Estimate, Missing, quotient, rounded
+from xb_muscle_ros.scores.local import Extreme, extreme, local, steepest
+from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.trial import Array
 
 # Force that rises by less than this over that before the pulse is no contraction, F0.
 SMALLEST_F0 = 1e-4
 _FEWEST = 5
+# Parabolas through a measured force are as wide as noise asks for: until standard errors are this share of the number,
+# and at most shares of the time to the peak for the peak and for the rise, of half relaxation for the fall, and of the
+# time between two pulses, where it is at most so many s.
+_SURE = 0.01
+_NARROWER = (0.0, 0.125, 0.25, 0.5, 1.0)
+_PEAK, _RISE, _FALL = 0.35, 0.1, 0.2
+_RIPPLE, _RIPPLE_S = 0.05, 0.01
+_STEPS = 5
+
+
+_Estimates = TypeVar("_Estimates", bound=tuple[Estimate, ...])
 
 
 class Twitch(NamedTuple):
@@ -21,16 +35,17 @@ class Twitch(NamedTuple):
         rest_f0: force before the pulse, F0.
         peak_f0: largest force above that, F0.
         to_peak_s: from the pulse to the peak, s.
-        half_relaxation_s: from the peak until half of the rise is lost, s; None where it is not within the record.
+        half_relaxation_s: from the peak until half of the rise is lost, s; without a value where it is not within the
+            record.
         rise_per_s, fall_per_s: steepest rise and fall over the peak, 1/s.
     """
 
-    rest_f0: float
-    peak_f0: float
-    to_peak_s: float
-    half_relaxation_s: float | None
-    rise_per_s: float
-    fall_per_s: float
+    rest_f0: Estimate
+    peak_f0: Estimate
+    to_peak_s: Estimate
+    half_relaxation_s: Estimate
+    rise_per_s: Estimate
+    fall_per_s: Estimate
 
 
 class Ripple(NamedTuple):
@@ -41,46 +56,121 @@ class Ripple(NamedTuple):
         fusion: force between the last two peaks over that of the last, above rest; 1: fused.
     """
 
-    peak_f0: float
-    fusion: float
+    peak_f0: Estimate
+    fusion: Estimate
 
 
-def twitch(time_s: Array, force_f0: Array, pulse_s: float) -> Twitch | Missing:
-    """Times of a twitch.
+def twitch(time_s: Array, force_f0: Array, pulse_s: float, noise: ForceNoise | None = None) -> Twitch | Missing:
+    """Times of a twitch, by parabolas through five samples, or more where force is noisy.
 
     Args:
-        time_s, force_f0: shape (n,), s and F0; what the noise does to a single sample, it does to the peak.
+        time_s, force_f0: shape (n,), s and F0.
         pulse_s: when the muscle is stimulated, s.
+        noise: of a measured force.
 
     Returns:
         nothing where there are too few samples, or force hardly rises.
     """
-    before, after = time_s <= pulse_s + 5e-10, time_s >= pulse_s - 5e-10
+    after = time_s >= pulse_s - 5e-10
     if np.count_nonzero(after) < _FEWEST:
         return Missing(f"there are fewer than {_FEWEST} samples after the pulse at {pulse_s:g} s")
-    rest = float(np.mean(force_f0[before])) if np.any(before) else float(force_f0[0])
-    t, force = time_s[after] - pulse_s, force_f0[after] - rest
+    rest = level_before(time_s, force_f0, pulse_s, noise)
+    assert rest.value is not None
+    t, force = time_s[after] - pulse_s, force_f0[after] - rest.value
     top = int(np.argmax(force))
-    peak = float(force[top])
-    if peak < SMALLEST_F0 or top == 0:
-        return Missing(f"force rises by {peak:.3g} F0 after the pulse; {SMALLEST_F0:g} are needed")
-    rates = np.diff(force) / np.diff(t)
-    fallen = np.flatnonzero(force[top:] <= 0.5 * peak)
-    half = None
-    if fallen.size:
-        k = top + int(fallen[0])
-        share = (force[k - 1] - 0.5 * peak) / (force[k - 1] - force[k])
-        half = float(t[k - 1] + share * (t[k] - t[k - 1]) - t[top])
-    return Twitch(rest, peak, float(t[top]), half, float(np.max(rates)) / peak, -float(np.min(rates)) / peak)
+    if force[top] < SMALLEST_F0 or top == 0:
+        return Missing(f"force rises by {force[top]:.3g} F0 after the pulse; {SMALLEST_F0:g} are needed")
+    reach_s = max(_PEAK * float(t[top]), 2.0 * float(np.max(np.diff(t))))
+    around = max(0.0, t[top] - reach_s), min(float(t[-1]), t[top] + reach_s)
+    found = _peak(t, force, around, _PEAK * float(t[top]), noise)
+    peak, to_peak = found.value.value, found.at_s.value
+    assert peak is not None
+    assert to_peak is not None
+    rise = _narrowest(lambda width_s: (steepest(t, force, (0.0, to_peak), width_s, 1.0, noise),), _RISE * to_peak)[0]
+    half = _half_relaxation(t, force, found, noise)
+    after_peak, most_s = (to_peak, float(t[-1])), _FALL * (half.value or float(t[-1]) - to_peak)
+    fall = _narrowest(lambda width_s: (steepest(t, force, after_peak, width_s, -1.0, noise),), most_s)[0]
+    over = Estimate(peak, found.value.se)
+    return Twitch(
+        rest,
+        Estimate(peak, None if noise is None else rounded(np.hypot(found.value.se or 0.0, rest.se or 0.0))),
+        found.at_s,
+        half,
+        quotient(rise, over),
+        quotient(Estimate(-(fall.value or 0.0), fall.se), over),
+    )
 
 
-def ripple(time_s: Array, force_f0: Array, rest_f0: float, last_pulses_s: tuple[float, float]) -> Ripple | Missing:
+def level_before(time_s: Array, force_f0: Array, pulse_s: float, noise: ForceNoise | None = None) -> Estimate:
+    """Mean force up to a pulse, F0; that of the first sample where there is none before."""
+    before = time_s <= pulse_s + 5e-10
+    inside = before if np.any(before) else np.arange(time_s.size) == 0
+    return Estimate(float(np.mean(force_f0[inside])), None if noise is None else noise.of_mean(time_s[inside]))
+
+
+def _narrowest(make: Callable[[float], _Estimates], most_s: float, least: float = 0.0) -> _Estimates:
+    """Of estimates by parabolas, those by the narrowest that are sure; else those by the widest."""
+    for share in _NARROWER:
+        found = make(share * most_s)
+        if all(each.value is not None and (each.se or 0.0) <= _SURE * max(abs(each.value), least) for each in found):
+            break
+    return found
+
+
+def _peak(t: Array, force: Array, around: tuple[float, float], most_s: float, noise: ForceNoise | None) -> Extreme:
+    """The peak by the narrowest parabolas by which height and time are sure; the widest tells how it is curved."""
+    widest = extreme(t, force, around, most_s, 1.0, noise)
+    height, at_s = widest.value.value, widest.at_s.value
+    assert height is not None
+    assert at_s is not None
+    curvature = abs(local(t, force, at_s, most_s).curvature)
+    for share in _NARROWER[:-1]:
+        here = local(t, force, at_s, share * most_s)
+        of_value = here.error(np.array([1.0, 0.0, 0.0]), noise) or 0.0
+        of_slope = here.error(np.array([0.0, 1.0, 0.0]), noise) or 0.0
+        if of_value <= _SURE * height and of_slope <= _SURE * curvature * at_s:
+            return extreme(t, force, around, share * most_s, 1.0, noise)
+    return widest
+
+
+def _half_relaxation(t: Array, force: Array, top: Extreme, noise: ForceNoise | None) -> Estimate:
+    """Time from the peak until parabolas are at half of it, s."""
+    peak, to_peak_s = top.value.value, top.at_s.value
+    assert peak is not None
+    assert to_peak_s is not None
+    late = t > to_peak_s
+    fallen = np.flatnonzero(force[late] <= 0.5 * peak)
+    if not fallen.size:
+        return Estimate(None, why="force does not fall to half of its peak within the record")
+    first_s = float(t[late][fallen[0]])
+
+    def crossing(width_s: float) -> tuple[Estimate]:
+        # From the first sample that is so low, the parabola's own crossing is a few steps away.
+        at_s = first_s
+        for _ in range(_STEPS):
+            here = local(t, force, at_s, width_s)
+            if here.slope >= 0.0:
+                return (Estimate(None, why="force does not fall through half of its peak"),)
+            at_s = float(np.clip(at_s + (0.5 * peak - here.value) / here.slope, to_peak_s, t[-1]))
+        se = here.error(np.array([1.0, 0.0, 0.0]) / here.slope, noise)
+        if se is not None:
+            others = 0.5 * (top.value.se or 0.0) / here.slope, top.at_s.se or 0.0
+            se = rounded(float(np.linalg.norm([se, *others])))
+        return (Estimate(at_s - to_peak_s, se),)
+
+    return _narrowest(crossing, _FALL * (first_s - to_peak_s))[0]
+
+
+def ripple(
+    time_s: Array, force_f0: Array, rest_f0: float, last_pulses_s: tuple[float, float], noise: ForceNoise | None = None
+) -> Ripple | Missing:
     """How far the last two responses of a train are fused (Celichowski and Grottel 1995).
 
     Args:
         time_s, force_f0: shape (n,), s and F0.
         rest_f0: force without stimulation, F0.
         last_pulses_s: times of the last two pulses, s.
+        noise: of a measured force.
 
     Returns:
         nothing where there are too few samples between the pulses.
@@ -92,14 +182,20 @@ def ripple(time_s: Array, force_f0: Array, rest_f0: float, last_pulses_s: tuple[
     last = (time_s >= end_s) & (time_s < end_s + 2.0 * interval_s)
     if np.count_nonzero(between) < _FEWEST or np.count_nonzero(last) < _FEWEST:
         return Missing(f"there are fewer than {_FEWEST} samples between two pulses")
-    force = force_f0 - rest_f0
-    top = int(np.flatnonzero(last)[np.argmax(force[last])])
-    peak = float(force[top])
-    if peak < SMALLEST_F0:
-        return Missing(f"force rises by {peak:.3g} F0; {SMALLEST_F0:g} are needed")
-    # The peak before the last, and the lowest force from there on.
-    earlier = (time_s >= time_s[top] - 1.5 * interval_s) & (time_s <= time_s[top] - 0.5 * interval_s)
-    first = (
-        int(np.flatnonzero(earlier)[np.argmax(force[earlier])]) if np.any(earlier) else int(np.flatnonzero(between)[0])
-    )
-    return Ripple(peak, float(np.min(force[first : top + 1])) / peak)
+    force, last_s = force_f0 - rest_f0, float(time_s[last][-1])
+    if float(np.max(force[last])) < SMALLEST_F0:
+        return Missing(f"force rises by {float(np.max(force[last])):.3g} F0; {SMALLEST_F0:g} are needed")
+
+    def seen(width_s: float) -> Ripple:
+        found = extreme(time_s, force, (end_s, last_s), width_s, 1.0, noise)
+        top_s = found.at_s.value
+        assert top_s is not None
+        # The peak before the last, and the lowest force from there on.
+        earlier = max(float(time_s[0]), top_s - 1.5 * interval_s), top_s - 0.5 * interval_s
+        before = extreme(time_s, force, earlier, width_s, 1.0, noise).at_s.value
+        assert before is not None
+        lowest = extreme(time_s, force, (before, top_s), width_s, -1.0, noise).value
+        return Ripple(found.value, quotient(lowest, found.value))
+
+    # Force may fall to rest between two pulses.
+    return _narrowest(seen, min(_RIPPLE * interval_s, _RIPPLE_S), 0.1)

@@ -38,39 +38,26 @@ class TwoRates(NamedTuple):
 
     Attributes:
         slow: of means over so many samples, hum aside.
-        fast: of the samples.
         averaged: samples in a mean.
         step_s: between samples, s.
         lines: hum.
+        beside: see `_beside`.
     """
 
     slow: TrialNoise
-    fast: TrialNoise
     averaged: int
     step_s: float
     lines: tuple[Line, ...]
+    beside: Array
 
     def autocovariance(self, lags_s: Array) -> Array:
         """At lags (s, ascending), without hum, F0², shape (n,)."""
         mean_step_s = self.averaged * self.step_s
         total = np.mean([each.at_lags(lags_s, mean_step_s) for each in self.slow.members], axis=0)
         total *= certain(self.slow)
-        beside = self._beside(mean_step_s)
-        total += np.interp(lags_s / self.step_s, np.arange(beside.size), beside, right=0.0)
+        total += np.interp(lags_s / self.step_s, np.arange(self.beside.size), self.beside, right=0.0)
         found: Array = total
         return found
-
-    def _beside(self, mean_step_s: float) -> Array:
-        """What the samples have beside the means' autocovariance, straight between its lags; at lags of a step, F0²."""
-        frequency_hz = np.fft.rfftfreq(_POINTS, self.step_s)
-        slow = _spectrum(self.slow, frequency_hz, mean_step_s)
-        straight = slow * np.sinc(frequency_hz * mean_step_s) ** 2
-        # From all of the one to all of the other.
-        octaves = np.log(np.maximum(frequency_hz, 1e-9) * mean_step_s / _CROSSING) / np.log(_WIDTH)
-        share = np.sin(0.25 * np.pi * (np.clip(octaves, -1.0, 1.0) + 1.0)) ** 2
-        fast = np.maximum(_spectrum(self.fast, frequency_hz, self.step_s), straight)
-        beside: Array = (1.0 - share) * slow + share * fast - straight
-        return np.fft.irfft(beside)[: _POINTS // 2] / self.step_s
 
 
 def two_rates(window: Window) -> TwoRates | None:
@@ -84,7 +71,20 @@ def two_rates(window: Window) -> TwoRates | None:
     lines, rest = hum(count * window.step_s, force.reshape(-1, count).mean(axis=1))
     slow = by_windows([Window(window.trial, count * window.step_s, rest)])[window.trial]
     fast = by_windows([window._replace(force_f0=force[-MOST:])])[window.trial]
-    return TwoRates(slow, fast, count, window.step_s, lines)
+    return TwoRates(slow, count, window.step_s, lines, _beside(slow, fast, window.step_s, count * window.step_s))
+
+
+def _beside(slow: TrialNoise, fast: TrialNoise, step_s: float, mean_step_s: float) -> Array:
+    """What samples have beside the means' autocovariance, straight between its lags; at lags of a step, F0²."""
+    frequency_hz = np.fft.rfftfreq(_POINTS, step_s)
+    below = _spectrum(slow, frequency_hz, mean_step_s)
+    straight = below * np.sinc(frequency_hz * mean_step_s) ** 2
+    # From all of the one to all of the other.
+    octaves = np.log(np.maximum(frequency_hz, 1e-9) * mean_step_s / _CROSSING) / np.log(_WIDTH)
+    share = np.sin(0.25 * np.pi * (np.clip(octaves, -1.0, 1.0) + 1.0)) ** 2
+    above = np.maximum(_spectrum(fast, frequency_hz, step_s), straight)
+    beside: Array = np.fft.irfft((1.0 - share) * below + share * above - straight)[: _POINTS // 2] / step_s
+    return beside
 
 
 def certain(noise: TrialNoise) -> float:
