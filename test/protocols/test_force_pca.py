@@ -66,3 +66,13 @@ def test_too_few_levels_are_a_note_and_no_number() -> None:
     found = xb.run_protocol("force-pca", "18Dec2017a", pca=[4.5, 6.1, 9.0], tell=lambda line: None)
     assert found.results[0].numbers["pca50"].value is None
     assert "isometric force is known at 3 levels of pCa; 5 are needed" in found.warnings[-1]
+
+
+@pytest.mark.parametrize(
+    ("model", "pca"), [("2state", [4.0, 4.5, 5.0, 5.2, 5.4, 5.6]), ("3state_coop", [6.5, 7.0, 7.5, 8.0, 8.5, 9.0])]
+)
+def test_a_pca50_at_the_end_of_the_levels_is_none(model: str, pca: list[float]) -> None:
+    told: list[str] = []
+    (found,) = xb.run_protocol("force-pca", "18Dec2017a", model=model, pca=pca, tell=told.append).results
+    assert found.numbers["pca50"].value is None
+    assert any("lies beyond the levels of pCa" in line for line in told)

@@ -191,3 +191,10 @@ def test_a_vmax_that_the_points_do_not_tell_is_said() -> None:
     numbers, _, told = _numbers_of(load, speed, 1.0, False)
     assert numbers["vmax_l0_per_s"].low < 0.0
     assert told[0] == "vmax: the 95 % interval goes down to 0 or below; these points do not tell it"
+
+
+def test_a_velocity_is_not_read_beyond_its_load() -> None:
+    with pytest.raises(
+        xb.UserError, match=r"--begin 0.12 and --window 0.1 s go on beyond the load, which is held for 0.15"
+    ):
+        xb.run_protocol("force-clamp", "18Dec2017a", begin=0.12, window=0.1, tell=lambda line: None)

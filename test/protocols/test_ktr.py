@@ -84,3 +84,8 @@ def test_the_error_of_k_tr_does_not_grow_as_noise_falls() -> None:
         values.append(one.column("k_tr_per_s")[0])
         errors.append(one.errors("k_tr_per_s")[0])
     assert 0.8 * np.std(values) < np.median(errors) < 5.0 * np.std(values)
+
+
+def test_the_ends_of_k_tr_have_their_pca() -> None:
+    (found,) = xb.run_protocol("ktr", "18Dec2017a", pca=[4.5, 6.1, 6.3], tell=lambda line: None).results
+    assert (found.numbers["highest_at_pca"].value, found.numbers["lowest_at_pca"].value) == (4.5, 6.3)

@@ -45,3 +45,20 @@ def test_a_trial_of_several_ramps_is_a_note() -> None:
     made = xb.simulate("18Dec2017a", recovery=0.1, as_measured=True)
     (found,) = xb.analyse_protocol("ramp-hold", made, tell=lambda line: None).results
     assert any("there is no single stretch or shortening" in note for note in found.notes)
+
+
+def test_a_ramp_between_two_samples_is_read_after_it() -> None:
+    (found,) = xb.run_protocol(
+        "ramp-hold", "18Dec2017a", amplitude=0.001, speed=5.0, pca=4.5, tell=lambda line: None
+    ).results
+    (step,) = xb.run_protocol("step", "18Dec2017a", size=0.001, tell=lambda line: None).results
+    assert found.rows[0]["end_f0"].value == pytest.approx(step.rows[0]["t1_f0"].value, abs=2e-3)
+    assert 0.9 < found.rows[0]["relaxed"] < 1.0
+
+
+def test_a_ramp_that_hardly_changes_force_loses_no_share() -> None:
+    (found,) = xb.run_protocol(
+        "ramp-hold", "18Dec2017a", amplitude=1e-6, speed=0.5, pca=9.0, tell=lambda line: None
+    ).results
+    assert "relaxed" not in found.rows[0]
+    assert any("share lost" in note for note in found.notes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -177,3 +178,22 @@ def test_each_calcium_has_processes_of_its_own(tmp_path: object) -> None:
     assert found.numbers == found.numbers_at["pCa 4.5"]
     assert set(made.found["found"][0]["numbers_at"]) == {"pCa 4.5", "pCa 6.1"}
     assert "pCa 6.1" in str(made)
+
+
+def test_a_bag_of_slow_sinusoids_gives_what_made_it(tmp_path: Path) -> None:
+    """Flanks of a slow sinusoid were taken for straight lines between corners; moduli without noise had all weight."""
+    frequency = [0.5, 1.0, 2.0, 4.37, 7.49, 12.85, 40.0, 100.0]
+    made = xb.run_protocol("sinusoid", "18Dec2017a", frequency=frequency, as_measured=True, tell=lambda line: None)
+    made.save(tmp_path)
+    told: list[str] = []
+    measured, model = xb.analyse_protocol(
+        "sinusoid", tmp_path, model="3state_coop", fibre="18Dec2017a", tell=told.append
+    ).results
+    (simulated,) = made.results
+    assert not any("corners" in line for line in told)
+    for found in (measured, model):
+        order = np.argsort(found.column("frequency_hz"))
+        for key in ("elastic_f0_per_l0", "viscous_f0_per_l0"):
+            assert found.column(key)[order] == pytest.approx(simulated.column(key), rel=5e-4)
+        for key in ("rate_a_per_s", "magnitude_a_f0_per_l0"):
+            assert found.numbers[key].value == pytest.approx(simulated.numbers[key].value, rel=0.01)

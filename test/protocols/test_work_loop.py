@@ -107,3 +107,28 @@ def test_every_cycle_has_its_row(tmp_path: Path) -> None:
     assert lines[0].startswith("fibre,of,trial,cycle,start_s,end_s,net_f0_l0,")
     tree = json.loads((tmp_path / "work_loop.json").read_text())
     assert [cycle["end_s"] for cycle in tree["found"][0]["cycles"][:3]] == pytest.approx([1.1, 2.1, 3.1])
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (
+            {"frequency": 200.0, "rate": 1000.0},
+            "5 for each cycle of 200 Hz; needed are 20: take a rate of 4000 or more",
+        ),
+        ({"cycles": 2.5}, "--cycles is 2.5; needed is a whole number, for example 2"),
+        ({"rate": 100.0, "frequency": 2.0}, "calcium rises with a time constant of 1.5 ms; needed are 667 or more"),
+    ],
+)
+def test_too_few_samples_and_broken_cycles_are_refused(options: dict[str, float], words: str) -> None:
+    with pytest.raises(UserError, match=words):
+        xb.run_protocol("work-loop", FIBRE, tell=lambda line: None, **options)
+
+
+@pytest.mark.parametrize("frequency", [0.5, 1.0, 2.0, 3.0, 5.0, 7.0])
+def test_all_cycles_are_found_up_to_the_end_of_the_record(frequency: float) -> None:
+    made = xb.run_protocol("work-loop", FIBRE, frequency=frequency, as_measured=True, tell=lambda line: None)
+    bare = [replace(t, facts=replace(t.facts, settings=(), protocol="", phases=())) for t in made.trials]
+    (found,) = xb.analyse_protocol("work-loop", bare, tell=lambda line: None).results
+    assert found.rows[0]["cycles"] == 6.0
+    assert found.rows[0]["net_f0_l0"].value == pytest.approx(made.results[0].rows[0]["net_f0_l0"].value, rel=2e-3)

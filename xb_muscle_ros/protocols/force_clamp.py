@@ -56,8 +56,17 @@ class ForceClamps(Protocol):
     source = "Hill 1938"
 
     def plan(self, fibre: str, settings: Settings) -> list[Planned]:
-        """One trial for each pCa and load; its length is that of the rest until a model answers."""
+        """One trial for each pCa and load; its length is that of the rest until a model answers.
+
+        Raises:
+            UserError: velocity would be read beyond the load.
+        """
         hold, begin, window, lead, rate = (settings[k][0] for k in ("hold", "begin", "window", "lead", "rate"))
+        if begin + window > hold * (1.0 + 1e-9):
+            raise UserError(
+                f"--begin {begin:g} and --window {window:g} s go on beyond the load, which is held for {hold:g} s; "
+                "take less of either, or a longer --hold"
+            )
         planned = []
         for pca, load in itertools.product(settings["pca"], settings["load"]):
             told = {"pca": pca, "load": load, "begin_s": begin, "window_s": window}

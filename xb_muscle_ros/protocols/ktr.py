@@ -47,7 +47,9 @@ class RedevelopmentRates(Protocol):
     }
     numbers: Mapping[str, Column] = {
         "highest_per_s": Column("largest k_tr", "1/s", ".2f"),
+        "highest_at_pca": Column("at pCa", "", "g"),
         "lowest_per_s": Column("smallest k_tr", "1/s", ".2f"),
+        "lowest_at_pca": Column("at pCa", "", "g"),
     }
     source = "Brenner and Eisenberg 1986"
 
@@ -91,8 +93,12 @@ class RedevelopmentRates(Protocol):
         rates, errors = found.column("k_tr_per_s"), found.errors("k_tr_per_s")
         if not np.any(np.isfinite(rates)):
             return found
-        ends = {"highest_per_s": int(np.nanargmax(rates)), "lowest_per_s": int(np.nanargmin(rates))}
-        numbers = {key: _number(rates[i], errors[i]) for key, i in ends.items()}
+        ends = {"highest": int(np.nanargmax(rates)), "lowest": int(np.nanargmin(rates))}
+        pca = found.column("pca")
+        numbers = {}
+        for name, i in ends.items():
+            numbers[f"{name}_per_s"] = _number(rates[i], errors[i])
+            numbers[f"{name}_at_pca"] = Number(float(pca[i]) if np.isfinite(pca[i]) else None)
         return Found(fibre, of, found.rows, numbers, {}, found.runs, found.notes)
 
     def draw(self, figure: Any, found: Sequence[Found]) -> None:

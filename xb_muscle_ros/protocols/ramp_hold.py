@@ -22,6 +22,8 @@ from xb_muscle_ros.trials.trial import Phase
 _MEAN_S, _SHARE = 0.002, 0.1
 # A hold that loses less of the ramp's change than this has no half time.
 _LOST = 0.05
+# A change of force below this has no share to lose, F0.
+_LEAST_F0 = 1e-4
 _MOVING = ("stretch", "shortening", "release", "test_stretch")
 
 
@@ -137,6 +139,8 @@ def _row(run: Run) -> tuple[Mapping[str, Cell], list[str]]:
     if before.value is None or at_end.value is None or held.value is None or at_end.value == before.value:
         return row, whys
     change = at_end.value - before.value
+    if abs(change) < max(_LEAST_F0, 3.0 * (at_end.se or 0.0)):
+        return row, [*whys, f"share lost: the ramp changes force by {change:.2g} F0 alone"]
     row["relaxed"] = (at_end.value - held.value) / change
     after = run.time_s >= phase.end_s
     since, force = run.time_s[after] - phase.end_s, run.force_f0[after]
@@ -147,9 +151,9 @@ def _row(run: Run) -> tuple[Mapping[str, Cell], list[str]]:
 
 
 def _mean(run: Run, from_s: float, to_s: float) -> Estimate:
-    """Mean force in a window, at least of its last sample."""
+    """Mean force in a window, or force at the first sample after one that has none."""
     inside = (run.time_s >= from_s - 5e-10) & (run.time_s <= to_s + 5e-10)
     if not np.any(inside):
-        inside = np.arange(run.time_s.size) == np.argmin(np.abs(run.time_s - to_s))
+        inside = np.arange(run.time_s.size) == min(int(np.searchsorted(run.time_s, to_s - 5e-10)), run.time_s.size - 1)
     se = None if run.noise is None else run.noise.of_mean(run.time_s[inside])
     return Estimate(float(np.mean(run.force_f0[inside])), se)

@@ -21,6 +21,8 @@ from xb_muscle_ros.trials.protocol import Allowed
 from xb_muscle_ros.trials.trial import Trial
 
 FREQUENCIES_HZ = tuple(float(f"{frequency:.4g}") for frequency in np.geomspace(0.1, 250.0, 30))
+# Moduli are good to this share of themselves, noise aside: length is a sinusoid to that.
+_GOOD_TO = 1e-3
 # A second harmonic of force above this share of the first is told.
 _LINEAR = 0.05
 _LETTERS = "abc"
@@ -210,11 +212,17 @@ def _at(pca: float | None) -> str:
 
 
 def _errors(found: Sequence[ComplexStiffness]) -> Any:
-    """Standard errors as complex numbers; None where one is not known."""
+    """Standard errors as complex numbers, not below what the moduli are good to; None where one is not known."""
     pairs = [(one.elastic.se, one.viscous.se) for one in found]
     if any(not real or not imaginary for real, imaginary in pairs):
         return None
-    return np.array([complex(real or 0.0, imaginary or 0.0) for real, imaginary in pairs])
+    sizes = [_GOOD_TO * abs(one.value) for one in found]
+    return np.array(
+        [
+            complex(np.hypot(real or 0.0, least), np.hypot(imaginary or 0.0, least))
+            for (real, imaginary), least in zip(pairs, sizes, strict=True)
+        ]
+    )
 
 
 def _said(fit: Processes) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.protocols.base import Planned, Run
 from xb_muscle_ros.protocols.calcium import PulseTransient
 from xb_muscle_ros.protocols.inputs import sample_times
@@ -27,8 +28,13 @@ def stimulated(
         pulses_s: times of the pulses, s.
 
     Raises:
-        UserError: there would be too many samples.
+        UserError: there would be too many samples, or so few that they miss the rise of calcium.
     """
+    if rate_hz * transient.rise_s < 1.0 - 1e-9:
+        raise UserError(
+            f"--rate is {rate_hz:g} samples per second, but calcium rises with a time constant of "
+            f"{1e3 * transient.rise_s:g} ms; needed are {1.0 / transient.rise_s:.0f} or more (one for each)"
+        )
     time_s = sample_times(duration_s, rate_hz, f"protocol {facts.protocol}")
     phases = (Phase("isometric", 0.0, float(time_s[-1])),)
     trial = Trial(

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.protocols.base import (
     MEASURED,
     Cell,
@@ -37,6 +38,8 @@ CYCLES = "cycles"
 _LEAD_S = 0.1
 # Net work may differ by this share of the work turned over where loops repeat.
 _SAME = 0.01
+# Fewer samples to a cycle change net work by more than 2 %.
+_LEAST_SAMPLES = 20.0
 _OF_CYCLE: Mapping[str, Column] = {
     "net_f0_l0": Column("net work", "10⁻³ F0·L0", ".3f", 1e3),
     "shortening_f0_l0": Column("shortening work", "10⁻³ F0·L0", ".3f", 1e3),
@@ -97,9 +100,11 @@ class WorkLoops(Protocol):
         """One trial for each combination; phase and duty do not matter for a bath of constant calcium.
 
         Raises:
-            UserError: see `transient_of`; there would be too many samples.
+            UserError: see `transient_of` and `stimulated`; samples are too few for a cycle, or cycles are not whole.
         """
         transient, rate, count = transient_of(settings), settings["rate"][0], round(settings["cycles"][0])
+        if abs(settings["cycles"][0] - count) > 1e-9:
+            raise UserError(f"--cycles is {settings['cycles'][0]:g}; needed is a whole number, for example {count}")
         baths = settings["bath-pca"]
         stimuli = list(itertools.product([None], settings["phase"], settings["duty"])) if 0.0 in baths else []
         given = [*stimuli, *((pca, None, None) for pca in baths if pca > 0.0)]
@@ -107,6 +112,11 @@ class WorkLoops(Protocol):
         for frequency, amplitude, (bath, phase, duty) in itertools.product(
             settings["frequency"], settings["amplitude"], given
         ):
+            if rate < _LEAST_SAMPLES * frequency * (1.0 - 1e-9):
+                raise UserError(
+                    f"--rate is {rate:g} samples per second, {rate / frequency:.3g} for each cycle of {frequency:g} "
+                    f"Hz; needed are {_LEAST_SAMPLES:g}: take a rate of {_LEAST_SAMPLES * frequency:g} or more"
+                )
             end_s = _LEAD_S + count / frequency
             told = {"frequency_hz": frequency, "amplitude_l0": amplitude, "stress_kpa": settings["stress"][0]}
             name = f"work_loop_{frequency:g}hz_amp{1e4 * amplitude:g}"

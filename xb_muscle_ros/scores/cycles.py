@@ -20,6 +20,8 @@ _FEWEST = 2
 _COMPARED, _SHAPE = 50, 0.05
 # A frequency is sought so often, and to this share.
 _STEPS, _CLOSE = 20, 1e-10
+# Part of a cycle by which an edge may lie beyond the record.
+_EDGE = 0.01
 
 
 Places = npt.NDArray[np.intp]
@@ -105,8 +107,11 @@ def _extended(time_s: Array, length_l0: Array, start_s: Array, by_l0: float) -> 
     shares = np.linspace(0.0, 1.0, _COMPARED)
     for side, beside_s in ((-1, start_s[0]), (1, start_s[-2])):
         edge_s = start_s[0] - period if side < 0 else start_s[-1] + period
-        if not time_s[0] <= edge_s <= time_s[-1]:
+        # Edges are known to a small part of a cycle; a record may end where its last one does.
+        within_s = float(np.clip(edge_s, time_s[0], time_s[-1]))
+        if abs(within_s - edge_s) > _EDGE * period:
             continue
+        edge_s = within_s
         begin_s = min(edge_s, edge_s - side * period)
         one, other = (np.interp(begin + period * shares, time_s, length_l0) for begin in (begin_s, beside_s))
         if float(np.sqrt(np.mean((one - other) ** 2))) < _SHAPE * by_l0:

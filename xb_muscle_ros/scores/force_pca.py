@@ -12,6 +12,8 @@ from xb_muscle_ros.trials.trial import Array
 
 _FEWEST = 5
 # Where the fit may look: pCa50 of skinned muscle lies within; a slope beyond 30 is a step between two neighbours.
+# A pCa50 this near to the first or last level, as a share of their range, is where the search ends.
+_NEAR_END = 0.01
 _STEEPEST = 30.0
 
 
@@ -70,7 +72,9 @@ def fit_force_pca(pca: Array, force_f0: Array) -> ForcePca | Missing:
         )
     except (RuntimeError, ValueError, OptimizeWarning):
         return Missing("no curve could be fitted")
-    if not 0.1 < found[1] < 0.999 * _STEEPEST or not np.min(x) < found[0] < np.max(x) or found[3] <= found[2]:
+    room = _NEAR_END * (float(np.max(x)) - float(np.min(x)))
+    within = np.min(x) + room < found[0] < np.max(x) - room
+    if not 0.1 < found[1] < 0.999 * _STEEPEST or not within or found[3] <= found[2]:
         return Missing(
             f"the curve that fits best, pCa50 {found[0]:.3g} with a Hill coefficient of {found[1]:.3g}, lies beyond "
             f"the levels of pCa or is as steep as {_STEEPEST:g}"

@@ -68,9 +68,11 @@ class Refined(NamedTuple):
 def with_corners(trial: Trial) -> Trial:
     """The trial with the corners of its length record, and finer steps for 30 ms after each.
 
-    Force and calcium stay at their own times. A trial whose samples are 2.5 ms apart or less, or whose length is not
-    straight between corners, comes back as it is, and so does one that this has refined before.
+    Force and calcium stay at their own times. A trial comes back as it is where samples are 2.5 ms apart or less, where
+    length is not straight between corners or a protocol made it oscillate, and where this has refined it before.
     """
+    if trial.facts.setting("frequency_hz") is not None:
+        return trial  # a sinusoid, whose flanks are nearly straight
     found = refined(trial.time_s, trial.length_change_l0, trial.facts.phases)
     if not found.corners:
         return trial
