@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import io
 import pickle
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
-from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials import spool
 from xb_muscle_ros.trials.spool import is_settled, release, roomy, settle, spooled
 from xb_muscle_ros.trials.trial import Trial, TrialFacts, frozen
@@ -47,15 +47,37 @@ def test_many_bytes_lie_in_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
     assert spooled([]) == b""
 
 
-def test_no_room_for_a_file_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Full(io.BytesIO):
-        def write(self, _: object) -> int:
-            raise OSError(28, "No space left on device")
+@pytest.mark.parametrize("room", [-1, 0, 5, 130, 10_000])
+def test_without_room_for_a_file_bytes_are_in_memory(monkeypatch: pytest.MonkeyPatch, room: int) -> None:
+    class Small(io.BytesIO):
+        def __init__(self, buffering: int) -> None:
+            if room < 0:
+                raise FileNotFoundError(2, "No usable temporary directory found")
+            super().__init__()
+
+        def write(self, data: bytes) -> int:  # type: ignore[override]
+            left = room - self.tell()
+            if left <= 0:
+                raise OSError(28, "No space left on device")
+            return super().write(data[:left])
+
+        def fileno(self) -> int:
+            raise OSError(25, "Not a file that can be mapped")
 
     monkeypatch.setattr(spool, "LEAST", 10)
-    monkeypatch.setattr(spool.tempfile, "TemporaryFile", Full)
-    with pytest.raises(UserError, match="cannot be written: No space left on device; make room there, or name"):
-        spooled([b"1" * 100])
+    monkeypatch.setattr(spool.tempfile, "TemporaryFile", Small)
+    blocks = [bytes([i]) * 30 for i in range(9)]
+    assert spooled(iter(blocks)) == b"".join(blocks)
+
+
+def test_what_cannot_be_read_is_not_taken_for_a_lack_of_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken() -> Iterator[bytes]:
+        yield b"1" * 100
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(spool, "LEAST", 10)
+    with pytest.raises(OSError, match="Input/output error"):
+        spooled(broken())
 
 
 def test_a_part_of_an_array_in_a_file_is_let_go_and_settled_with_it(monkeypatch: pytest.MonkeyPatch) -> None:

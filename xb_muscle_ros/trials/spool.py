@@ -16,8 +16,6 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
-from xb_muscle_ros.errors import UserError
-
 Array = npt.NDArray[np.float64]
 
 # Arrays of fewer numbers stay in memory.
@@ -42,36 +40,45 @@ def roomy(size: int) -> Array:
 
 
 def spooled(blocks: Iterable[bytes]) -> bytes | Spool:
-    """Bytes put behind each other, in a file where they are many.
-
-    Raises:
-        UserError: there is no room for the file.
-    """
-    held, size, more = [], 0, iter(blocks)
-    for block in more:
+    """Bytes put behind each other, in a file where they are many and there is room for one, else in memory."""
+    held, more = [b""], iter(blocks)
+    while sum(map(len, held)) < 8 * LEAST:
+        block = next(more, None)
+        if block is None:
+            return b"".join(held)
         held.append(block)
-        size += len(block)
-        if size >= 8 * LEAST:
-            break
-    else:
-        return b"".join(held)
-    with tempfile.TemporaryFile() as file:
-        for block in itertools.chain(held, more):
-            _write(file, block)
-        _write(file, b"")
-        return Spool(file.fileno(), file.tell(), access=mmap.ACCESS_READ)
-
-
-def _write(file: IO[bytes], block: bytes) -> None:
     try:
-        file.write(block)
-        if not block:
-            file.flush()
-    except OSError as problem:
-        raise UserError(
-            f"a temporary file in {tempfile.gettempdir()} cannot be written: {problem.strerror}; make room there, or "
-            "name another folder in the environment variable TMPDIR"
-        ) from problem
+        file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115  # errors of the source are not those of this file
+    except OSError:
+        return b"".join(itertools.chain(held, more))
+    rest = itertools.chain(held, more)
+    with file:
+        for block in rest:
+            if not _written(file, block):
+                file.seek(0)
+                return b"".join([file.read(), block, *rest])
+        return _mapped(file)
+
+
+def _written(file: IO[bytes], block: bytes) -> bool:
+    """Whether a block could be written; if not, the file ends where it did."""
+    end = file.tell()
+    try:
+        done = 0
+        while done < len(block):
+            done += file.write(block[done:])
+    except OSError:
+        file.truncate(end)
+        return False
+    return True
+
+
+def _mapped(file: IO[bytes]) -> bytes | Spool:
+    try:
+        return Spool(file.fileno(), file.tell(), access=mmap.ACCESS_READ)
+    except OSError:
+        file.seek(0)
+        return file.read()
 
 
 def release(*arrays: Array | bytes | Spool) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -99,3 +100,26 @@ def test_a_zero_anywhere_is_no_text(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     path = lab.write(tmp_path, b"a,b\n1,2\n3,4\n5,\x006\n")
     with pytest.raises(UserError, match="is no text; export the recording as CSV or TSV"):
         encodings.read_text(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf_32", "UTF16"])
+def test_an_order_of_bytes_that_is_not_told_is_the_machine_s(tmp_path: Path, encoding: str) -> None:
+    own = f"{encoding.lower().replace('_', '-')}-{sys.byteorder[0]}e".replace("utf16", "utf-16")
+    path = lab.write(tmp_path, "\n".join(LINES).encode(own))
+    assert encodings.read_text(path, encoding).utf8[:] == "".join(f"{line}\n" for line in LINES).encode()
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-32", "punycode", "utf-7"])
+def test_text_of_another_encoding_is_one_line(tmp_path: Path, encoding: str) -> None:
+    path = lab.write(tmp_path, "\n".join(LINES).encode("utf-8"))
+    why = lab.refusal(path, COLUMNS, encoding=encoding)
+    assert str(path) in why
+    with pytest.raises(UserError, match="encoding is 'undefined'"):
+        lab.run(path, COLUMNS, encoding="undefined")
+
+
+def test_the_line_at_fault_of_wide_characters(tmp_path: Path) -> None:
+    lines = ["time_s,length_mm,force_mN", *["0.001,2,3"] * 30]
+    path = lab.write(tmp_path, "\n".join(lines).encode("utf-16-le") + b"\n\x00\x00\xd8\x31\x00")
+    with pytest.raises(UserError, match=r"line 32 is no utf-16-le text"):
+        encodings.read_text(path, "utf-16-le")

@@ -36,6 +36,7 @@ def test_a_column_has_the_numbers_of_its_cells(
     lines = [line for line in (delimiter.join(row) for row in swapped) if line.strip()]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(rows, "_BLOCK", block)
+        patch.setattr(rows, "_FEW", max(block // 2, 1))
         patch.setattr(spool, "LEAST", least)
         read = TextRows(lines, range(1, len(lines) + 1), delimiter)
         for index in range(5):

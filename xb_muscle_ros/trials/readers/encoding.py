@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import codecs
 import io
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +21,9 @@ _BEGINS = {
     codecs.BOM_UTF16_BE: "utf-16",
 }
 _BLOCK_BYTES = 1 << 20
+# Encodings that have a mark of their order of bytes at the begin.
+_ORDERED = ("utf-16", "utf-32")
+_ORDERED_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE, codecs.BOM_UTF32_BE)  # UTF-32-LE begins as UTF-16-LE
 
 
 class Text(NamedTuple):
@@ -60,8 +64,12 @@ class _NoText(Exception):
 
 
 def _told(path: Path, encoding: str) -> Text:
+    begin = next(_blocks(path), b"")
+    name = codecs.lookup(encoding).name
+    if name in _ORDERED and not begin.startswith(_ORDERED_MARKS):
+        name += f"-{sys.byteorder[0]}e"  # as Python takes it
     try:
-        return Text(_utf8(path, encoding), "")
+        return Text(_utf8(path, name), "")
     except _NoText as problem:
         raise UserError(
             f"{path}, line {problem.line} is no {encoding} text ({problem.why}); give another encoding, or leave it out"
@@ -95,11 +103,16 @@ def _decoded(path: Path, encoding: str) -> Iterator[bytes]:
     decoder = io.IncrementalNewlineDecoder(codecs.getincrementaldecoder(encoding)(), translate=True)
     line, last = 1, ""
     for block in _blocks(path, ended=True):
+        # A carriage return at the end of a block waits for what follows.
+        waiting = decoder.getstate()[1] & 1
         try:
             text = decoder.decode(block, final=not block)
         except UnicodeDecodeError as problem:
-            before = problem.object[: problem.start + 1]
-            raise _NoText(problem.reason, line + len(before.splitlines()) - 1) from None
+            before = problem.object[: problem.start].decode(encoding, "ignore")
+            ends = before.replace("\r\n", "\n").replace("\r", "\n").count("\n")
+            raise _NoText(problem.reason, line + waiting + ends) from None
+        except UnicodeError as problem:
+            raise _NoText(str(problem), line) from None
         text = text.removeprefix("\ufeff") if not last else text
         if "\x00" in text:
             raise UserError(f"{path} is no text; export the recording as CSV or TSV")

@@ -91,8 +91,9 @@ def _encoding(keys: Keys) -> str | None:
     name = keys.text("encoding", "give one such as utf-8, cp1252 or mac_roman")
     try:
         b"a".decode(name)
-    except (LookupError, UnicodeDecodeError) as problem:
-        if isinstance(problem, LookupError):
+    except (LookupError, UnicodeError) as problem:
+        # One letter may be too little for it.
+        if not isinstance(problem, UnicodeDecodeError):
             raise UserError(
                 f"{keys.where}: encoding is '{name}'; needed is one that Python knows, such as utf-8, utf-16, cp1252, "
                 "latin-1 or mac_roman"

@@ -6,7 +6,7 @@ import csv
 import itertools
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Protocol, overload
+from typing import Protocol, overload
 
 import numpy as np
 
@@ -16,8 +16,8 @@ from xb_muscle_ros.trials.spool import release, roomy, settle
 from xb_muscle_ros.trials.trial import Array
 
 SPACES = " "
-# Rows that are read in one go.
-_BLOCK = 1 << 16
+# Rows that are read in one go, and where some of them cannot be.
+_BLOCK, _FEW = 1 << 16, 1 << 10
 # A unit in brackets belongs to the name before it.
 _WORD = re.compile(r"\S+(?:[ \t]+[(\[][^)\]]*[)\]])?")
 
@@ -60,6 +60,7 @@ class TextRows:
         """Take lines without those that are no rows; `SPACES` stands for any number of blanks and tabs."""
         self._lines, self._numbers, self._delimiter = lines, numbers, delimiter
         self._matrices: dict[str, Array | None] = {}
+        self._columns: dict[str, Array] = {}
         self.cells: Sequence[list[str]] = _Split(lines, delimiter)
 
     def __len__(self) -> int:
@@ -77,27 +78,36 @@ class TextRows:
         return self._matrices[decimal]
 
     def column(self, index: int, decimal: str) -> Array:
-        """Blocks of rows that NumPy cannot read are read cell by cell."""
+        """Rows that NumPy cannot read are read cell by cell, all columns at once."""
         matrix = self.matrix(decimal)
         if matrix is not None:
             return matrix[:, index] if index < matrix.shape[1] else np.full(len(self), np.nan)
-        found = roomy(len(self))
-        first = 0
-        for lines in _blocks(self._lines):
-            block = None if self._is_quoted(lines) else self._parsed(lines, decimal, index)
-            here = found[first : first + len(lines)]
-            if block is not None:
-                here[:] = block[:, 0]
+        if decimal not in self._columns:
+            self._columns[decimal] = self._mixed(decimal)
+        found = self._columns[decimal]
+        return found[index] if index < found.shape[0] else np.full(len(self), np.nan)
+
+    def _mixed(self, decimal: str) -> Array:
+        """All columns, nan where a cell is missing or no number, shape (columns, rows)."""
+        width = max(map(len, self.cells), default=0)
+        found, first = roomy(width * len(self)).reshape(width, len(self)), 0
+        for lines in _blocks(self._lines, _FEW):
+            here = found[:, first : first + len(lines)]
+            block = None if self._is_quoted(lines) else self._parsed(lines, decimal)
+            if block is not None and block.shape[1] == width:
+                here[:] = block.T
             else:
-                rows = (split(line, self._delimiter) for line in lines)
-                here[:] = [number(cells[index].strip(), decimal) if index < len(cells) else np.nan for cells in rows]
+                here[:] = np.nan
+                for j, cells in enumerate(itertools.zip_longest(*(split(line, self._delimiter) for line in lines))):
+                    here[j] = _column(cells, decimal)
             first += len(lines)
+        release(found)
         return settle(found)
 
     def _read(self, decimal: str) -> Array | None:
         """All rows; each column in one piece, as it is wanted later."""
         columns, first = None, 0
-        for lines in _blocks(self._lines):
+        for lines in _blocks(self._lines, _BLOCK):
             block = self._parsed(lines, decimal)
             if block is None or (columns is not None and block.shape[1] != columns.shape[0]):
                 return None
@@ -110,8 +120,8 @@ class TextRows:
         release(columns)
         return settle(columns).T
 
-    def _parsed(self, lines: Sequence[str], decimal: str, index: int | None = None) -> Array | None:
-        """Some lines, all of their columns or one; None where NumPy's parser cannot read them."""
+    def _parsed(self, lines: Sequence[str], decimal: str) -> Array | None:
+        """Some lines; None where NumPy's parser cannot read them."""
         if decimal == COMMA:
             if self._delimiter == "," or any("." in line for line in lines):
                 return None
@@ -121,9 +131,8 @@ class TextRows:
             lines = [line.removesuffix(delimiter) for line in lines]
         if not any(lines):  # nothing but delimiters
             return None
-        wanted: Any = {} if index is None else {"usecols": index}
         try:
-            found: Array = np.loadtxt(lines, delimiter=delimiter, comments=None, quotechar='"', ndmin=2, **wanted)
+            found: Array = np.loadtxt(lines, delimiter=delimiter, comments=None, quotechar='"', ndmin=2)
         except ValueError:
             return None
         return found if found.shape[0] == len(lines) else None
@@ -164,10 +173,22 @@ class _Split(Sequence[list[str]]):
         return (split(line, self._delimiter) for line in self._lines)
 
 
-def _blocks(lines: Iterable[str]) -> Iterator[list[str]]:
+def _blocks(lines: Iterable[str], size: int) -> Iterator[list[str]]:
     left = iter(lines)
-    while block := list(itertools.islice(left, _BLOCK)):
+    while block := list(itertools.islice(left, size)):
         yield block
+
+
+def _column(cells: Sequence[str | None], decimal: str) -> Array:
+    """Numbers of cells, nan where one is missing or is none, shape (cells,)."""
+    try:
+        # Most columns hold numbers alone; Python takes 1_000 for one.
+        found = np.fromiter(map(float, cells), np.float64, len(cells))  # type: ignore[arg-type]
+        if decimal != COMMA and not any("_" in cell for cell in cells if cell):
+            return found
+    except (TypeError, ValueError):
+        pass
+    return np.array([np.nan if cell is None else number(cell.strip(), decimal) for cell in cells])
 
 
 class CellRows:

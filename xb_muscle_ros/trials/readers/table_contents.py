@@ -58,11 +58,11 @@ def _faults(table: Table, name: str, values: Array) -> Iterator[str]:
     empty = [row for row, text in texts.items() if not text]
     strange = [row for row, text in texts.items() if text]
     if empty:
-        yield f"{_cells(len(empty))} empty, the first in line {table.rows.number(empty[0])}"
+        yield f"{_cells(len(empty))} empty, the first in {table.place(empty[0])}"
     if strange:
         row, text = strange[0], texts[strange[0]]
         why = ", thousands separators" if is_grouped(text) else ""
-        yield (f"{_cells(len(strange))} no finite number, the first '{text}' in line {table.rows.number(row)}{why}")
+        yield (f"{_cells(len(strange))} no finite number, the first '{text}' in {table.place(row)}{why}")
 
 
 def _cells(count: int) -> str:

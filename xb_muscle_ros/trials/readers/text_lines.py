@@ -109,8 +109,9 @@ def _begins(utf8: bytes | Spool) -> tuple[Places, Places]:
         end = utf8.rfind(_END, first, first + _BLOCK) + 1 or utf8.find(_END, first) + 1
         codes = np.frombuffer(utf8[first:end], np.uint8)
         here = np.concatenate(([0], np.flatnonzero(codes == _END[0])[:-1] + 1))
-        visible = np.logical_or.reduceat(codes > _LAST_BLANK, here)
-        odd = ~visible | (codes[here] == ord("#")) | (codes[here] > _LAST_ASCII)
+        # Beyond ASCII there are blanks, too.
+        visible = np.logical_or.reduceat((codes > _LAST_BLANK) & (codes <= _LAST_ASCII), here)
+        odd = ~visible | (codes[here] == ord("#"))
         begins.append((here + first).astype(kind))
         doubtful.append(np.flatnonzero(odd) + lines)
         first, lines = end, lines + here.size
