@@ -53,3 +53,11 @@ def test_two_trials_of_one_name_are_refused(tmp_path: Path) -> None:
     trial = read_trial(BAG)
     with pytest.raises(xb.UserError, match="2 trials would become"):
         xb.export_trials([trial, trial], tmp_path / "out")
+
+
+def test_a_normalised_trial_comes_back_without_doubts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its lengths are in m with 1 m for L0, which the mapping reads in L0."""
+    assert main(["export", str(BAG), "--out", str(tmp_path)]) == 0
+    table = tmp_path / f"{BAG.name}.csv"
+    assert main(["import", str(table), "--mapping", str(table.with_suffix(".yaml")), "--out", str(tmp_path / "b")]) == 0
+    assert "its header tells" not in capsys.readouterr().out

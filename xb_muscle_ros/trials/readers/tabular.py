@@ -15,6 +15,7 @@ from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal
 from xb_muscle_ros.trials.readers.contents import Contents
 from xb_muscle_ros.trials.readers.description import FACTS, ImportMapping, fact_of, filled
 from xb_muscle_ros.trials.readers.left_out import Told, is_left_out, told_by, wanted_by
+from xb_muscle_ros.trials.readers.length import L0_RANGE_M
 from xb_muscle_ros.trials.readers.options import DEFAULTS, TableOptions, read_options, wanted
 from xb_muscle_ros.trials.readers.parts import Part, parts_of
 from xb_muscle_ros.trials.readers.pca_columns import check_pca
@@ -159,6 +160,14 @@ def _sheet_facts(table: Table, mapping: ImportMapping) -> dict[str, float]:
     return {fact: fact_of(text, sheets.factors.get(fact, 1.0), fact, table.where) for fact, text in found.items()}
 
 
+def _may_be(table: Table, column: str, unit: str) -> bool:
+    """Whether a column may be in a unit: a length near 1 m is no muscle's, but L0 as it is kept where it is 1 m."""
+    if UNITS[unit].kind != "length":
+        return True
+    values, _ = table.samples(column, ragged=True)
+    return not float(np.nanmedian(values)) * UNITS[unit].factor > L0_RANGE_M[1]
+
+
 def _unit_doubts(table: Table, mapping: ImportMapping, part: Part) -> Iterator[str]:
     """Lines on columns whose header tells another unit than the mapping."""
     for key, column in mapping.columns.items():
@@ -166,7 +175,7 @@ def _unit_doubts(table: Table, mapping: ImportMapping, part: Part) -> Iterator[s
             continue
         name = part.columns[key]
         told = unit_in(table.units[table.index(name)], key) if table.units else None
-        if told is not None and UNITS[told] != column.unit and key != "calcium":
+        if told is not None and UNITS[told] != column.unit and key != "calcium" and _may_be(table, name, told):
             yield (
                 f"{table.where}: column '{name}' is read in {column.unit_name}, but its header tells {told}; check "
                 f"columns.{key}.unit (--{key}-unit)"
