@@ -37,7 +37,11 @@ _OPTIONS: dict[str, tuple[str, type, str]] = {
     "--time-unit": ("columns.time.unit", str, "unit of time (default: what the table's header tells)"),
     "--length-column": ("columns.length.column", str, "column of length"),
     "--length-pattern": ("columns.length.pattern", str, "columns of length, one a trial: 'L_pCa(?P<pca>.+)'"),
-    "--length-unit": ("columns.length.unit", str, "unit of length (default: what the table's header tells)"),
+    "--length-unit": (
+        "columns.length.unit",
+        str,
+        "unit of length, or of volts a calibration: '0.1 mm/V'; default: as the table's header tells",
+    ),
     "--length-is": ("columns.length.is", str, "'absolute' length (default) or 'change' from the reference length"),
     "--length-of": ("columns.length.of", str, "length of the 'fibre' (default), a 'sarcomere' or a 'half_sarcomere'"),
     "--reference-length": (
@@ -47,7 +51,16 @@ _OPTIONS: dict[str, tuple[str, type, str]] = {
     ),
     "--force-column": ("columns.force.column", str, "column of measured force or stress"),
     "--force-pattern": ("columns.force.pattern", str, "columns of force, one a trial: 'F_pCa(?P<pca>.+)'"),
-    "--force-unit": ("columns.force.unit", str, "unit of force or stress (default: what the table's header tells)"),
+    "--force-unit": (
+        "columns.force.unit",
+        str,
+        "unit of force or stress, or of volts a calibration: '0.5 mN/V'; default: as the table's header tells",
+    ),
+    "--force-zero": (
+        "columns.force.zero",
+        str,
+        "'as_recorded' (default), 'slack', or what the column reads without force: '0.12 V'",
+    ),
     "--f0": ("f0", str, "the force or stress that is F0, for example '97 kPa'"),
     "--calcium-column": ("columns.calcium.column", str, "column of free calcium"),
     "--calcium-unit": ("columns.calcium.unit", str, "unit of calcium, or pCa"),

@@ -98,7 +98,7 @@ def test_a_command_gives_way_to_what_was_measured_and_says_so(tmp_path: Path) ->
 
 
 def test_a_name_and_a_unit_that_contradict_each_other_are_not_taken(tmp_path: Path) -> None:
-    file = table(tmp_path / "a.csv", {"time_s": TIME_S, "length (V)": LENGTH_MM, "force (g)": FORCE_MN})
+    file = table(tmp_path / "a.csv", {"time_s": TIME_S, "length (deg)": LENGTH_MM, "force (g)": FORCE_MN})
     found = inspect_file(file)
     assert set(found.recognition.roles) == {"time"}
     assert "9.80665 mN" in found.recognition.taken_for["force (g)"]

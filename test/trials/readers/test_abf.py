@@ -91,6 +91,13 @@ def test_offsets_are_added(tmp_path: Path, write: Write) -> None:
     assert read(path)["f"].force_n[0] == pytest.approx(1e-3 * (3000 * unit_per_count(FORCE) + 1.5), rel=1e-7)
 
 
+def test_a_channel_in_volts_takes_a_calibration(tmp_path: Path, write: Write) -> None:
+    path = whole(write, tmp_path / "f.abf", [LENGTH, LIGHT, FORCE._replace(unit=b"V")])
+    (trial,) = read(path, columns={"force": {"column": "Force", "unit": "0.25 mN/V"}}).values()
+    assert trial.force_n == pytest.approx(0.25e-3 * FORCE_COUNTS * unit_per_count(FORCE), rel=1e-7)
+    assert not any("V" in line for line in trial.warnings)
+
+
 def test_each_sweep_is_a_trial(tmp_path: Path) -> None:
     counts = np.vstack([COUNTS, COUNTS])
     for path in (
@@ -141,7 +148,11 @@ def test_what_both_tell_is_as_the_mapping_says(tmp_path: Path, write: Write) -> 
     ("inputs", "keys", "words"),
     [
         ([LENGTH, LIGHT, FORCE._replace(unit=b"grams")], {}, "channel 'Force': unit 'grams' of force is not known"),
-        ([LENGTH, LIGHT, FORCE._replace(unit=b"V")], {}, "'V' is no unit of force; allowed: N, mN"),
+        (
+            [LENGTH, LIGHT, FORCE._replace(unit=b"V")],
+            {},
+            "'V' is no unit of force; in its place give what one V stands for, for example '0.5 mN/V'",
+        ),
         (
             INPUTS,
             {"columns": {"force": {"column": "Farce"}}},

@@ -25,7 +25,7 @@ from xb_muscle_ros.trials.readers.units import Quantity, quantity, unit_of
     ],
 )
 def test_units(text: str, column: str, kind: str, factor: float) -> None:
-    assert unit_of(text, column, "here") == (kind, factor)
+    assert unit_of(text, column, "here") == (kind, factor, "")
 
 
 def test_an_unknown_unit_is_answered_with_the_nearest() -> None:

@@ -17,7 +17,7 @@ from xb_muscle_ros.trials.readers.base import Reader
 from xb_muscle_ros.trials.readers.columns import BAG
 from xb_muscle_ros.trials.readers.contents import Content, Contents
 from xb_muscle_ros.trials.readers.description import name_of
-from xb_muscle_ros.trials.readers.units import KINDS, UNITS
+from xb_muscle_ros.trials.readers.units import KINDS, UNITS, calibration, volts_of
 
 _TEXTS = ("fibre", "trial", "data_set", "source", "reference_length", "f0")
 
@@ -109,7 +109,9 @@ def _signal(made: Proposal, reader: Reader, one: Recognised) -> None:
         made.add(2, f"unit: {scalar(one.unit)}")
     else:
         allowed = ", ".join(name for name, unit in UNITS.items() if unit.kind in KINDS[one.role])
-        told = f"one of {allowed}; {_range(one.content)}{hint(one)}"
+        volts = volts_of(one.content.unit or one.named.unit, one.role)
+        needed = calibration(one.role, volts) if volts else f"one of {allowed}"
+        told = f"{needed}; {_range(one.content)}{'' if volts else hint(one)}"
         made.add(2, "unit:", f"fill in: {told}", active=False)
         made.missing.append(f"unit of {one.role} ({one.content.label}): {told}")
     for key, value in one.content.told_more.items():

@@ -14,7 +14,7 @@ import numpy as np
 from xb_muscle_ros.trials.inspecting.words import OTHER_UNITS, Named, fitting, read_name, roles_of_unit
 from xb_muscle_ros.trials.readers.columns import SIGNALS
 from xb_muscle_ros.trials.readers.contents import Content, Contents
-from xb_muscle_ros.trials.readers.units import KINDS, UNITS
+from xb_muscle_ros.trials.readers.units import KINDS, UNITS, volts_of
 
 # Fields of joints that say how a number is sent, not what it is; a velocity is none of the roles.
 _SENT_AS = ("position", "effort", "data", "velocity")
@@ -70,7 +70,8 @@ def recognise(contents: Contents) -> Recognition:
     for content in contents.signals:
         one, why_not = _looked_at(content)
         found.taken_for[content.label] = why_not
-        found.units[content.label] = one.unit if one is not None else content.unit or _named(content).unit
+        told = content.unit or _named(content).unit
+        found.units[content.label] = told if one is None else one.unit or volts_of(told, one.role)
         if one is not None:
             candidates[one.role].append(one)
     for role, each in candidates.items():
@@ -110,6 +111,8 @@ def _looked_at(content: Content) -> tuple[Recognised | None, str]:
 
 def _by_name(content: Content, role: str, unit: str, named: Named) -> tuple[Recognised | None, str]:
     meant = fitting(unit, role) if unit else ""
+    if not meant and volts_of(unit, role):
+        return Recognised(content, role, "", f"by its name; it is in {unit}", False, named), ""
     if unit and not meant:
         allowed = ", ".join(known for known, each in UNITS.items() if each.kind in KINDS[role])
         other = OTHER_UNITS.get(unit.casefold(), "")

@@ -120,5 +120,5 @@ def _differing(file: AbfFile, mapping: ImportMapping) -> Iterator[str]:
     for key, column in mapping.columns.items():
         unit = "" if key == "time" else file.channels[file.index(column.name)].unit
         known = unit_in(unit, key) if unit else None
-        if unit and (known is None or UNITS[known] != column.unit):
+        if unit and unit != column.unit.per and (known is None or UNITS[known] != column.unit):
             yield f"{file.path}: the file says {unit} of {key}, the mapping {column.unit_name}; the mapping's is used"

@@ -93,6 +93,7 @@ class ImportMapping:
         f0_at_pca: F0 is the initial isometric force of the trial at this pCa in the same folder; None where not.
         f0_note: where F0 comes from, where that was found out rather than given.
         force_zero_from_slack: force is zero while the fibre is slack after a release.
+        force_zero: what the force column reads where there is no force; None for zero.
         notch_hz: frequencies that are taken out of length and force, Hz.
         facts: those of `FACTS` that hold for every file (-log10 M, L0, s).
         file_name: finds facts in file names by its groups ``pca``, ``amplitude_l0``, ``recovery_s``.
@@ -129,6 +130,7 @@ class ImportMapping:
     f0_at_pca: float | None = None
     f0_note: str = ""
     force_zero_from_slack: bool = False
+    force_zero: Quantity | None = None
     notch_hz: tuple[float, ...] = ()
     facts: Mapping[str, float] = field(default_factory=dict)
     file_name: re.Pattern[str] | None = None

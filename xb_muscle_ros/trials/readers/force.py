@@ -25,6 +25,10 @@ EXPECTED_SCALING = (0.5, 2.0)
 SLACK_PART = (0.6, 0.9)
 
 
+# Base units, for notes.
+_BASE = {"force": "N", "stress": "Pa", "relative force": "F0"}
+
+
 class Force(NamedTuple):
     """Force (N; empty where not measured) at its times (s), and the force that is F0 (N)."""
 
@@ -52,6 +56,11 @@ def read_force(
             raise UserError(f"{where}: isometric scaling needs a force column; name it or leave the scaling out")
         return Force(np.empty(0), np.empty(0))
     force = signal.values * mapping.force.unit.factor
+    if mapping.force_zero is not None:
+        force = force - mapping.force_zero.value
+        draft.notes.append(
+            f"{mapping.force_zero.value:.6g} {_BASE[mapping.force_zero.kind]} of the recorded force are its zero"
+        )
     if mapping.force_zero_from_slack:
         zero = _slack_force(where, time_s, force, phases)
         force = force - zero

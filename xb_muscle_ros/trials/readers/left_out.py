@@ -11,7 +11,7 @@ from xb_muscle_ros.trials.readers.columns import SIGNALS
 from xb_muscle_ros.trials.readers.layout import Wanted
 from xb_muscle_ros.trials.readers.options import wanted
 from xb_muscle_ros.trials.readers.table import Table
-from xb_muscle_ros.trials.readers.units import unit_in
+from xb_muscle_ros.trials.readers.units import calibration, unit_in, volts_of
 
 
 class Told(NamedTuple):
@@ -75,6 +75,12 @@ def _units(table: Table, tree: Mapping[str, Any]) -> Iterator[tuple[str, str, st
         unit = units.pop() if len(units) == 1 else None
         if unit is None:
             fault = "tells different units" if units else "tells no unit that is known for it"
+            volts = {volts_of(table.units[table.index(name)], signal) for name in names} - {""}
+            if volts:
+                raise UserError(
+                    f"{table.where}: {', '.join(map(repr, names))} {'is' if len(names) == 1 else 'are'} in volts; by "
+                    f"columns.{signal}.unit in the mapping or --{signal}-unit give {calibration(signal, volts.pop())}"
+                )
             raise UserError(
                 f"{table.where}: the header of {', '.join(map(repr, names))} {fault}; give it by columns.{signal}.unit "
                 f"in the mapping or --{signal}-unit"

@@ -28,7 +28,7 @@ from xb_muscle_ros.trials.readers.columns import (
 from xb_muscle_ros.trials.readers.description import FACTS, FIRST_ISOMETRIC, LENGTHS_OF, Column, ImportMapping
 from xb_muscle_ros.trials.readers.options import TABLE_KEYS, read_options
 from xb_muscle_ros.trials.readers.tree import Keys, check_keys
-from xb_muscle_ros.trials.readers.units import Quantity, finite
+from xb_muscle_ros.trials.readers.units import Quantity, finite, reading
 
 _NAMES = ("fibre", "trial", "data_set", "source")
 _PARTS = (
@@ -80,7 +80,7 @@ def build_mapping(
     fibre = keys.text("fibre", "name the fibre, for example 'fibre: 18Dec2017a' or --fiber 18Dec2017a")
     columns = keys.below("columns", *SIGNALS, "trial")
     time, length = read_column(columns, "time", kind), read_column(columns, "length", kind)
-    length_keys = columns.below("length")
+    length_keys, force = columns.below("length"), optional_column(columns, "force", kind)
     scaling = keys.below("isometric_scaling", "source", "fractions_f0")
     file_name, factors = _file_name(keys.below("file_name", "pattern", "factors"))
     from_start = keys.values.get("reference_length") == FIRST_ISOMETRIC
@@ -92,7 +92,7 @@ def build_mapping(
         source=keys.line("source"),
         time=time,
         length=length,
-        force=optional_column(columns, "force", kind),
+        force=force,
         calcium=optional_column(columns, "calcium", kind),
         stimulation=read_stimulation(columns, kind),
         activation=read_activation(keys),
@@ -103,12 +103,13 @@ def build_mapping(
         length_is_change=length_keys.choice("is", "absolute", "change") == "change",
         length_of=length_keys.choice("of", *LENGTHS_OF),
         reference_length=None if from_start else keys.quantity("reference_length", "length", "42.8 mm"),
-        at_reference=length_keys.quantity("at_reference", "length", "42.5 mm"),
+        at_reference=_at_reference(length_keys, length),
         largest_step_s=columns.below("time").amount("largest_step", "time", "0.5 s"),
         servo_give=keys.below("phases", "servo_give").quantity("servo_give", "length", "0.4 mm"),
         f0=None if f0_is_found else keys.quantity("f0", "force", "100 kPa"),
         f0_at_pca=keys.below("f0", "isometric_at_pca").number("isometric_at_pca") if f0_is_found else None,
-        force_zero_from_slack=columns.below("force").choice("zero", "as_recorded", "slack") == "slack",
+        force_zero_from_slack=columns.below("force").values.get("zero") == "slack",
+        force_zero=_force_zero(columns.below("force"), force),
         notch_hz=_notch(keys),
         facts={name: keys.number(name) for name in FACTS if name in keys},
         file_name=file_name,
@@ -117,10 +118,42 @@ def build_mapping(
         isometric_source=scaling.line("source"),
         gear_ratio=_gear_ratio(keys),
     )
+    if made.length.unit.per and "is" not in length_keys.values and made.at_reference is None:
+        raise UserError(
+            f"{where}: lengths are in volts, and what 0 V is does not show; give columns.length.is (--length-is) as "
+            "'change', where 0 V is the reference length, or 'absolute', where it is no length at all, or give what "
+            "the column reads at the reference length by columns.length.at_reference, for example '2.5 V'"
+        )
     units = (_length_faults(made, in_header), _force_faults(made, in_header))
     for fault in itertools.chain(*units, _calcium_faults(made), _pattern_faults(made)):
         raise UserError(f"{where}: {fault}")
     return made
+
+
+def _at_reference(keys: Keys, length: Column) -> Quantity | None:
+    text = keys.values.get("at_reference")
+    if text is None or not length.unit.per:
+        return keys.quantity("at_reference", "length", "42.5 mm")
+    return reading(str(text), "length", length.unit, keys.name("at_reference"), keys.where, "2.5 V")
+
+
+def _force_zero(keys: Keys, force: Column | None) -> Quantity | None:
+    """What the column reads without force, where the mapping tells a number."""
+    text = str(keys.values.get("zero", "as_recorded"))
+    if text in ("as_recorded", "slack"):
+        return None
+    if force is None or not any(character.isdigit() for character in text):
+        raise UserError(
+            f"{keys.where}: {keys.name('zero')} is '{text}'; allowed: as_recorded, slack, or what the column reads "
+            "without force, for example '0.12 V'"
+        )
+    found = reading(text, "force", force.unit, keys.name("zero"), keys.where, "0.02 mN")
+    if found.kind != force.unit.kind:
+        raise UserError(
+            f"{keys.where}: {keys.name('zero')} is a {found.kind}, the force column a {force.unit.kind}; give it in "
+            "the column's unit"
+        )
+    return found
 
 
 def _notch(keys: Keys) -> tuple[float, ...]:

@@ -22,7 +22,7 @@ from xb_muscle_ros.trials.readers.pca_columns import check_pca
 from xb_muscle_ros.trials.readers.table import Table, taken
 from xb_muscle_ros.trials.readers.table_contents import table_contents
 from xb_muscle_ros.trials.readers.tree import Keys
-from xb_muscle_ros.trials.readers.units import UNITS, unit_in
+from xb_muscle_ros.trials.readers.units import UNITS, calibration, unit_in, volts_of
 from xb_muscle_ros.trials.trial import Array
 
 
@@ -174,7 +174,14 @@ def _unit_doubts(table: Table, mapping: ImportMapping, part: Part) -> Iterator[s
         if key == "time" and mapping.rate_hz is not None:
             continue
         name = part.columns[key]
-        told = unit_in(table.units[table.index(name)], key) if table.units else None
+        unit = table.units[table.index(name)] if table.units else ""
+        volts = volts_of(unit, key)
+        if volts and volts != column.unit.per:
+            yield (
+                f"{table.where}: column '{name}' is read in {column.unit_name}, but its header tells {volts}; by "
+                f"columns.{key}.unit (--{key}-unit) give {calibration(key, volts)}"
+            )
+        told = unit_in(unit, key)
         if told is not None and UNITS[told] != column.unit and key != "calcium" and _may_be(table, name, told):
             yield (
                 f"{table.where}: column '{name}' is read in {column.unit_name}, but its header tells {told}; check "

@@ -10,10 +10,14 @@ from xb_muscle_ros.errors import UserError, suggest
 
 
 class Unit(NamedTuple):
-    """A unit: what it measures and how many of the kind's base unit it is (s, Hz, m, L0, N, Pa, F0, µM, V)."""
+    """A unit: what it measures and how many of the kind's base unit it is (s, Hz, m, L0, N, Pa, F0, µM, V).
+
+    Of a signal in volts it is what one of them stands for; `per` is then their unit, ``V`` or ``mV``.
+    """
 
     kind: str
     factor: float
+    per: str = ""
 
 
 class Quantity(NamedTuple):
@@ -59,6 +63,12 @@ _SPELLINGS = {
     **dict.fromkeys(("L/L0", "Lo"), "L0"),
     **dict.fromkeys(("pca", "-log[Ca]"), "pCa"),
 }
+# What a volt of a length or force stands for: ``0.5 mN/V``, negative where polarity is turned.
+_CALIBRATED = ("length", "force")
+_PER_VOLT = re.compile(
+    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>\S+?)\s*/\s*(?P<per>m?V)\s*"
+)
+VOLTS = ("V", "mV")
 _BRACKETED = re.compile(r"[(\[{<]\s*([^()\[\]{}<>]+?)\s*[)\]}>]\s*$")
 _BEHIND = re.compile(r"[\w)][_ ,/;]+\s*([^\W\d_][^\s_,;]*|%\w+)$")
 
@@ -81,11 +91,22 @@ def finite(value: object, key: str, where: str) -> float:
 def unit_of(text: str, column: str, where: str) -> Unit:
     """The unit named ``text`` for a column of ``time``, ``length``, ``force``, ``calcium`` or ``stimulation``.
 
+    A length or force in volts has a calibration in its place, such as ``0.5 mN/V``.
+
     Raises:
-        UserError: unknown unit, or one of something else.
+        UserError: unknown unit, one of something else, or a calibration of zero.
     """
     name = _simple(text)
     allowed = [known for known, unit in UNITS.items() if unit.kind in KINDS[column]]
+    volts = _PER_VOLT.fullmatch(name) if column in _CALIBRATED else None
+    if volts is not None and volts["unit"] in allowed:
+        number = float(volts["number"])
+        if number == 0.0 or not math.isfinite(number):
+            raise UserError(f"{where}: unit '{text}' of {column} makes nothing of a volt; give what one stands for")
+        own = UNITS[volts["unit"]]
+        return Unit(own.kind, number * own.factor, volts["per"])
+    if name in VOLTS and column in _CALIBRATED:
+        raise UserError(f"{where}: '{text}' is no unit of {column}; in its place give {calibration(column, name)}")
     if name not in UNITS:
         raise UserError(f"{where}: unit '{text}' of {column} is not known{suggest(name, allowed)}")
     if name not in allowed:
@@ -105,6 +126,40 @@ def header_unit(name: str) -> str:
     match = _BRACKETED.search(name) or _BEHIND.search(name)
     found = match.group(1) if match else name if name == "pCa" else ""
     return found if any(unit_in(found, signal) for signal in KINDS) else ""
+
+
+def calibration(column: str, volts: str) -> str:
+    """What has to be given of a length or force in volts, in words."""
+    return f"what one {volts} stands for, for example '{'0.5 mN' if column == 'force' else '0.1 mm'}/{volts}'"
+
+
+def volts_of(unit: str, column: str) -> str:
+    """``V`` or ``mV``, where that is what a file tells of a length or force; else empty."""
+    found = unit_in(unit, "stimulation") if column in _CALIBRATED else None
+    return found if found in VOLTS else ""
+
+
+def reading(text: str, column: str, unit: Unit, what: str, where: str, example: str) -> Quantity:
+    """What a column reads, such as ``0.12 V`` or ``42.5 mm``, in the base unit of what it measures.
+
+    Args:
+        unit: of the column; where that is a calibration, the reading may be in volts.
+
+    Raises:
+        UserError: no number with a unit that fits.
+    """
+    match = re.fullmatch(r"\s*(\S+)\s+(\S+)\s*", text)
+    if unit.per and match is not None and match.group(2) in VOLTS:
+        volts = finite(match.group(1), what, where) * UNITS[match.group(2)].factor / UNITS[unit.per].factor
+        return Quantity(volts * unit.factor, unit.kind)
+    try:
+        value = float(match.group(1)) if match else math.nan
+    except ValueError:
+        value = math.nan
+    if match is None or not math.isfinite(value):
+        raise UserError(f"{where}: {what} is '{text}'; needed is a number and its unit, for example '{example}'")
+    own = unit_of(match.group(2), column, f"{where}: {what}")
+    return Quantity(value * own.factor, own.kind)
 
 
 def _simple(text: str) -> str:
