@@ -129,3 +129,10 @@ def test_what_leads_away_or_is_all_there_is_is_no_quick_phase() -> None:
     assert "t2_f0" not in found.rows[0]
     (found,) = xb.run_protocol("step", "18Dec2017a", window=0.5, size=0.002, tell=lambda line: None).results
     assert "t2_f0" not in found.rows[0]
+
+
+@pytest.mark.parametrize(("model", "viscous"), [("hill", True), ("hill_se", False), ("3state_coop", False)])
+def test_force_that_is_gone_with_the_movement_is_told(model: str, viscous: bool) -> None:
+    told: list[str] = []
+    xb.run_protocol("step", "18Dec2017a", model=model, size=[-0.001, 0.001], tell=told.append)
+    assert any("that is viscosity, not stiffness" in line for line in told) == viscous

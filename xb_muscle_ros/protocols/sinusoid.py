@@ -193,7 +193,8 @@ def _remarks(found: Sequence[tuple[float | None, ComplexStiffness]], measured: b
         notes.append(
             f"force is not linear in length: its second harmonic is above {100.0 * _LINEAR:g} % of the first at "
             f"{len(bent)} of {len(found)} frequencies, at most {100.0 * (worst.second or 0.0):.3g} % at "
-            f"{worst.frequency_hz:.4g} Hz, {_at(pca)}; take a smaller amplitude"
+            f"{worst.frequency_hz:.4g} Hz, {_at(pca)}; take a smaller amplitude; where that does not help, "
+            "force has a kink at this length, as a passive spring that begins to bear has"
         )
     lacking = sum(one.elastic.se is None for _, one in found) if measured else 0
     if lacking:

@@ -25,6 +25,8 @@ _LONGEST_S = 0.005
 _SMALL_L0 = 0.003
 # What T1 is read so long after the step is told, s: a quick phase has begun.
 _LATE_S = 1e-4
+# Less of the change of force than this is left a sample after the step.
+_GONE = 0.1
 
 
 class QuickSteps(Protocol):
@@ -147,8 +149,13 @@ def _row(run: Run) -> tuple[Mapping[str, Cell], list[str]]:
     size = _size(run.trial, start_s, end_s) if size is None else size
     t1 = first_after(run.time_s, run.force_f0, end_s, run.noise)
     row |= {"size_l0": size, "step_s": end_s - start_s, "t1_f0": t1}
-    late_s = float(run.time_s[min(int(np.searchsorted(run.time_s, end_s - 5e-10)), run.time_s.size - 1)]) - end_s
+    first = min(int(np.searchsorted(run.time_s, end_s - 5e-10)), run.time_s.size - 1)
+    late_s = float(run.time_s[first]) - end_s
     told = [f"T1: it is that of the first sample, {1e3 * late_s:.2g} ms after the step"] if late_s > _LATE_S else []
+    if before.value is not None and t1.value is not None and first + 1 < run.time_s.size:
+        kept, change = float(run.force_f0[first + 1]) - before.value, abs(t1.value - before.value)
+        if abs(kept) < _GONE * change and change > 5.0 * (t1.se or 0.0):
+            told.append("T1: force is gone with the movement; that is viscosity, not stiffness")
     window_s = run.setting("window_s") or min(0.05, float(run.time_s[-1]) - end_s)
     found = quick_recovery(run.time_s, run.force_f0, end_s, window_s, size, run.noise)
     if isinstance(found, Missing):
