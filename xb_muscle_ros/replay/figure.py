@@ -60,7 +60,7 @@ def _panel(upper: Any, lower: Any, trial: Trial, simulated: Simulated, label: st
     lines = []
     if trial.force_time_s.size:
         line = _force(trial.force_time_s, trial.force_n, facts.f0_n)
-        lines += lower.plot(*line, **DATA_LINE)
+        lines += lower.plot(*line, **{**DATA_LINE, "linewidth": _LINE})
     line = _force(simulated.time_s, simulated.force_n, facts.f0_n)
     lines += lower.plot(*line, color=MODEL, linewidth=_LINE, label=label)
     if live is not None:

@@ -127,6 +127,8 @@ class TextRows:
                 return None
             lines = [line.replace(",", ".") for line in lines]
         delimiter = None if self._delimiter == SPACES else self._delimiter
+        if delimiter is None and any('"' in line for line in lines):
+            return None  # blanks within quotes: cells are what `split` makes of them
         if delimiter is not None and lines[0].endswith(delimiter):
             lines = [line.removesuffix(delimiter) for line in lines]
         if not any(lines):  # nothing but delimiters
