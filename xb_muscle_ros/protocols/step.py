@@ -161,7 +161,6 @@ def _row(run: Run) -> tuple[Mapping[str, Cell], list[str]]:
     if isinstance(found, Missing):
         return row, [*told, f"T2: {found.why}"]
     return row | {
-        "t1_f0": found.t1_f0,
         "t2_f0": found.t2_f0,
         "quick_per_s": found.quick_per_s,
         "slow_per_s": found.slow_per_s,

@@ -32,14 +32,12 @@ class QuickRecovery(NamedTuple):
     """Of one step.
 
     Attributes:
-        t1_f0: force at the end of the step, F0.
         t2_f0: force to which the quick recovery alone leads, F0.
         quick_per_s, slow_per_s: rates of the two exponentials, 1/s.
         fitted: force of the curve at the samples of the window, F0.
         at_s: these samples, s from the end of the step.
     """
 
-    t1_f0: Estimate
     t2_f0: Estimate
     quick_per_s: Estimate
     slow_per_s: Estimate
@@ -50,9 +48,9 @@ class QuickRecovery(NamedTuple):
 def quick_recovery(
     time_s: Array, force_f0: Array, end_s: float, window_s: float, size_l0: float, noise: ForceNoise | None = None
 ) -> QuickRecovery | Missing:
-    """T1, and T2 by two exponentials through the force after the step.
+    """T2 by two exponentials through the force after the step.
 
-    T1 is the force at the end of the step. F(t) = F_end + A_q·exp(-k_q·t) + A_s·exp(-k_s·t) is fitted to the window
+    F(t) = F_end + A_q·exp(-k_q·t) + A_s·exp(-k_s·t) is fitted to the window
     after it; T2 = F_end + A_s, the slow phase taken back to the end of the step, as the tangent to the plateau is by
     Ford, Huxley and Simmons.
 
@@ -87,13 +85,12 @@ def quick_recovery(
         errors = [rounded(each) for each in known]
         if abs(quick) < _SURE * of_quick:
             return Missing(f"{none} (amplitude {quick:.2g} ± {of_quick:.1g} F0)")
-    t1 = first_after(time_s, force_f0, end_s, noise)
     t2, of_quick_rate, of_slow_rate = map(Estimate, (end + slow, k_quick, k_slow), errors)
-    return QuickRecovery(t1, t2, of_quick_rate, of_slow_rate, t, _curve(t, *found))
+    return QuickRecovery(t2, of_quick_rate, of_slow_rate, t, _curve(t, *found))
 
 
 def first_after(time_s: Array, force_f0: Array, end_s: float, noise: ForceNoise | None = None) -> Estimate:
-    """Force of the first sample at the end of a step or after it, F0."""
+    """T1: force of the first sample at the end of a step or after it, F0."""
     first = min(int(np.searchsorted(time_s, end_s - 5e-10)), time_s.size - 1)
     se = None if noise is None else noise.of_mean(time_s[first : first + 1])
     return Estimate(float(force_f0[first]), se)
