@@ -198,3 +198,21 @@ def test_a_velocity_is_not_read_beyond_its_load() -> None:
         xb.UserError, match=r"--begin 0.12 and --window 0.1 s go on beyond the load, which is held for 0.15"
     ):
         xb.run_protocol("force-clamp", "18Dec2017a", begin=0.12, window=0.1, tell=lambda line: None)
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_one_load_is_no_hyperbola(given: bool) -> None:
+    """Four points at one load had a vmax of 0.55073 with an error of 0.00014."""
+    found = fit_hill(np.array([0.2799, 0.2801, 0.2798, 0.2802]), np.array([0.3, 0.3001, 0.2999, 0.3]), given)
+    assert isinstance(found, Missing)
+    assert found.why.startswith("there are 1 different")
+
+
+def test_a_recording_without_a_clamp_is_not_that_of_a_model() -> None:
+    made = xb.simulate("18Dec2017a", as_measured=True, recovery=0.1)
+    measured, model = xb.analyse_protocol(
+        "force-clamp", made, model="3state_coop", fibre="18Dec2017a", tell=lambda _: None
+    ).results
+    if not any("load" in row for row in measured.rows):
+        assert model.rows == ()
+        assert any("the model has no load to bear" in note for note in model.notes)

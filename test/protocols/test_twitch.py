@@ -10,6 +10,7 @@ import pytest
 import xb_muscle_ros as xb
 from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.scores.twitch import ripple, twitch
+from xb_muscle_ros.trials.trial import Trial
 
 CRITICALLY_DAMPED = 0.04
 """Milner-Brown's twitch F = t/T·exp(1 - t/T) peaks at T with 1, and is half of it 1.6783 T later."""
@@ -105,3 +106,53 @@ def test_fusion_of_a_noisy_train_is_not_below_it() -> None:
         (found,) = xb.analyse_protocol("tetanus", [noisy], tell=lambda line: None).results[0].rows
         assert found["fusion"].value == pytest.approx(row["fusion"].value, abs=4.0 * found["fusion"].se)
         assert found["fusion"].se < 0.02
+
+
+def recorded(rate: float, noise: float = 0.0, until: float = 1.0, artefact: float = 0.0) -> Trial:
+    """A twitch of 0.3 F0 that peaks 50 ms after its pulse at 0.5 s; calcium is not recorded."""
+    time = np.arange(0.0, until, 1.0 / rate)
+    late = np.maximum(time - 0.5, 0.0) / 0.05
+    force = 0.02 + 0.3 * late * np.exp(1.0 - late) + noise * np.random.default_rng(4).standard_normal(time.size)
+    force = force + artefact * ((time >= 0.5) & (time < 0.5 + 1.5 / rate))
+    facts = xb.TrialFacts("made", "twitch", 5.0, phases=(xb.Phase("isometric", 0.0, float(time[-1])),))
+    return Trial(facts, time, np.ones(time.size), np.zeros(1), np.ones(1), time, force)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 2e-3, 1e-2])
+def test_a_pulse_that_is_not_told_is_found_under_noise(noise: float) -> None:
+    """Noise of 0.7 % of the peak was taken for the begin: 568 ± 6 ms to the peak."""
+    (row,) = xb.analyse_protocol("twitch", [recorded(1000.0, noise)], tell=lambda line: None).results[0].rows
+    assert row["to_peak_s"].value == pytest.approx(0.05, abs=0.012)
+    assert row["peak_f0"].value == pytest.approx(0.3, abs=0.02)
+    assert row["peak_f0"].se < 0.02
+
+
+@pytest.mark.parametrize(
+    ("trial", "words"),
+    [
+        (recorded(1000.0, until=0.53), "force still rises where the record ends"),
+        (recorded(60.0), "more than half of the time to the peak"),
+        (recorded(1000.0, artefact=0.9), "the largest force comes with the pulse; an artefact"),
+    ],
+    ids=["cut", "coarse", "artefact"],
+)
+def test_a_twitch_that_tells_nothing_is_a_note(trial: Trial, words: str) -> None:
+    told: list[str] = []
+    calcium = np.where(trial.time_s < 0.5, 0.1, 1.0)
+    lit = replace(trial, calcium_time_s=trial.time_s, calcium_um=calcium, facts=replace(trial.facts, pca=None))
+    (row,) = xb.analyse_protocol("twitch", [lit], tell=told.append).results[0].rows
+    assert any(words in line for line in told), told
+    assert all(row.get(key) is None or row[key].value is None for key in ("peak_f0", "to_peak_s", "fall_per_s"))
+
+
+def test_a_train_that_is_cut_has_no_fusion() -> None:
+    made = xb.run_protocol("tetanus", "18Dec2017a", frequency=5.0, as_measured=True, tell=lambda line: None)
+    (trial,) = made.trials
+    end = trial.time_s <= (trial.facts.setting("last_pulse_s") or 0.0) + 0.004
+    cut = replace(
+        trial, time_s=trial.time_s[end], length_m=trial.length_m[end], force_time_s=trial.force_time_s[end],
+        force_n=trial.force_n[end],
+    )  # fmt: skip
+    told: list[str] = []
+    (row,) = xb.analyse_protocol("tetanus", [cut], tell=told.append).results[0].rows
+    assert "fusion" not in row

@@ -132,3 +132,42 @@ def test_all_cycles_are_found_up_to_the_end_of_the_record(frequency: float) -> N
     (found,) = xb.analyse_protocol("work-loop", bare, tell=lambda line: None).results
     assert found.rows[0]["cycles"] == 6.0
     assert found.rows[0]["net_f0_l0"].value == pytest.approx(made.results[0].rows[0]["net_f0_l0"].value, rel=2e-3)
+
+
+def test_noise_of_length_is_no_work() -> None:
+    """Each step up or down counted: 0.118 F0 L0 of shortening for 0.0425."""
+    made = xb.run_protocol("work-loop", FIBRE, frequency=2.0, as_measured=True, tell=lambda line: None)
+    (true,), (trial,) = made.results[0].rows, made.trials
+    noisy = replace(trial, length_m=trial.length_m + 1e-3 * np.random.default_rng(0).standard_normal(trial.time_s.size))
+    (row,) = xb.analyse_protocol("work-loop", [noisy], tell=lambda line: None).results[0].rows
+    for key in ("net_f0_l0", "shortening_f0_l0", "lengthening_f0_l0"):
+        assert row[key].value == pytest.approx(true[key].value, abs=2e-3)
+
+
+def test_force_that_only_moves_tells_no_noise() -> None:
+    time = np.arange(2001) * 5e-4
+    length = 0.05 * np.sin(2.0 * np.pi * 10.0 * time)
+    force = 0.5 + 0.3 * np.sin(2.0 * np.pi * 10.0 * time - 0.5)
+    trial = Trial(
+        xb.TrialFacts("made", "loops", phases=(xb.Phase("isometric", 0.0, 1.0),)), time, 1.0 + length, np.zeros(1),
+        np.ones(1), time, force,
+    )  # fmt: skip
+    told: list[str] = []
+    (row,) = xb.analyse_protocol("work-loop", [trial], tell=told.append).results[0].rows
+    assert row["net_f0_l0"].se is None
+    assert any("standard error not known" in line for line in told)
+
+
+@pytest.mark.parametrize("cycles", [3, 4])
+def test_few_cycles_between_still_lengths_are_found(cycles: int) -> None:
+    time = np.arange(1000 * (cycles + 2) + 1) * 1e-3
+    moving = (time >= 1.0) & (time <= 1.0 + cycles)
+    length = np.where(moving, 0.04 * np.sin(2.0 * np.pi * (time - 1.0)), 0.0)
+    force = 0.4 + 5.0 * length
+    trial = Trial(
+        xb.TrialFacts("made", "loops", phases=(xb.Phase("isometric", 0.0, 1.0),)), time, 1.0 + length, np.zeros(1),
+        np.ones(1), time, force,
+    )  # fmt: skip
+    (row,) = xb.analyse_protocol("work-loop", [trial], tell=lambda line: None).results[0].rows
+    assert row["cycles"] == cycles
+    assert row["net_f0_l0"].value == pytest.approx(0.0, abs=1e-5)

@@ -88,7 +88,8 @@ class ForceClamps(Protocol):
         found = _window(Run(trial, trial.force_time_s, trial.measured_f0))
         before = isometric_force(trial, trial.force_time_s, trial.measured_f0)
         if isinstance(found, Missing) or not before.value:
-            return super().repeat(muscle, trial, settle_s)
+            why = found.why if isinstance(found, Missing) else before.why or "force before the clamp is zero"
+            raise NoAnswer(f"trial {trial.facts.trial}: {why}, so the model has no load to bear")
         moves_s = _still_until(trial)
         return _under_load(muscle, trial, (found.start_s, found.end_s), moves_s, found.load_f0 / before.value, settle_s)
 

@@ -89,5 +89,9 @@ def read_model(protocol: Protocol, fibre: Fibre, trials: Sequence[Trial], settle
     muscle = Muscle(fibre)
     lacking: list[str] = []
     asked = (partial(protocol.repeat, muscle, trial, settle_s) for trial in trials)
-    found = protocol.analyse(trials[0].facts.fibre, fibre.model, list(_answered(asked, lacking)))
+    name = trials[0].facts.fibre
+    try:
+        found = protocol.analyse(name, fibre.model, list(_answered(asked, lacking)))
+    except NoAnswer:
+        found = Found(name, fibre.model, ())
     return replace(found, notes=(*lacking, *found.notes))

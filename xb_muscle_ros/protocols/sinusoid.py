@@ -95,7 +95,7 @@ class Sinusoid(Protocol):
                     run.simulated is None,
                 )  # fmt: skip
                 if isinstance(one, Missing):
-                    notes.append(f"trial {name}: {one.why}")
+                    notes += [line for line in [f"trial {name}: {one.why}"] if line not in notes]
                     continue
                 found.append((pca, one))
                 rows.append({"trial": name, "pca": pca, **_row(one)})

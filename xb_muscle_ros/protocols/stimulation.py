@@ -14,6 +14,8 @@ from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
 
 # Calcium, or without it force, that passes this share of its rise tells when stimulation began.
 _BEGUN = 0.02
+# Noise does not rise above so many of its standard deviations.
+_SPREADS = 3.0
 
 
 def stimulated(
@@ -57,7 +59,12 @@ def begun_s(run: Run) -> tuple[float, str]:
         over = np.flatnonzero(calcium > calcium[0] + _BEGUN * (np.max(calcium) - calcium[0]))
         if over.size:
             return float(run.trial.calcium_time_s[over[0]]), "stimulation is taken to begin where calcium rises"
-    rise = run.force_f0 - run.force_f0[0]
-    over = np.flatnonzero(rise > _BEGUN * np.max(rise))
-    begin = int(over[0]) if over.size else 0
-    return float(run.time_s[begin]), "stimulation is taken to begin where force rises by 2 % of its peak"
+    # What comes before the last sample that is as low as rest is no rise, whatever noise does.
+    top = int(np.argmax(run.force_f0))
+    rest = float(np.median(run.force_f0[: max(top // 4, 1)]))
+    spread = 1.4826 * float(np.median(np.abs(run.force_f0[: max(top // 4, 1)] - rest)))
+    least = max(_BEGUN * (float(run.force_f0[top]) - rest), _SPREADS * spread)
+    low = np.flatnonzero(run.force_f0[:top] - rest <= least)
+    begin = int(low[-1]) + 1 if low.size else 0
+    share = 100.0 * least / max(float(run.force_f0[top]) - rest, 1e-12)
+    return float(run.time_s[begin]), f"stimulation is taken to begin where force rises by {share:.2g} % of its peak"

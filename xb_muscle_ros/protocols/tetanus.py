@@ -13,6 +13,7 @@ from xb_muscle_ros.protocols.figures import legend, lettered, logarithmic, looks
 from xb_muscle_ros.protocols.inputs import facts_of, rate_option
 from xb_muscle_ros.protocols.stimulation import begun_s, stimulated
 from xb_muscle_ros.scores.estimate import Missing, notes_of
+from xb_muscle_ros.scores.standard_error import noise_between
 from xb_muscle_ros.scores.twitch import level_before, ripple
 from xb_muscle_ros.trials.protocol import ALLOWED, Allowed
 
@@ -73,14 +74,15 @@ class Tetani(Protocol):
         for run in runs:
             name, frequency, last_s = run.trial.facts.trial, run.setting("frequency_hz"), run.setting("last_pulse_s")
             first_s, guessed = begun_s(run)
-            rest = level_before(run.time_s, run.force_f0, first_s, run.noise)
+            noise = None if run.simulated is not None else noise_between(run.trial, float(run.time_s[0]), first_s)
+            rest = level_before(run.time_s, run.force_f0, first_s, noise)
             assert rest.value is not None
             row: dict[str, Cell] = {"trial": name, "frequency_hz": frequency, "rest_f0": rest}
             if frequency is None or last_s is None:
                 notes += [(name, f"pulse: {guessed}"), (name, "fusion: the trial does not tell its pulses")]
                 rows.append(row | {"peak_f0": float(np.max(run.force_f0)) - rest.value})
                 continue
-            found = ripple(run.time_s, run.force_f0, rest.value, (last_s - 1.0 / frequency, last_s), run.noise)
+            found = ripple(run.time_s, run.force_f0, rest.value, (last_s - 1.0 / frequency, last_s), noise)
             if isinstance(found, Missing):
                 notes.append((name, f"fusion: {found.why}"))
             rows.append(row if isinstance(found, Missing) else row | found._asdict())

@@ -11,7 +11,7 @@ from xb_muscle_ros.protocols.figures import legend, lettered, looks
 from xb_muscle_ros.protocols.inputs import facts_of, rate_option
 from xb_muscle_ros.protocols.stimulation import begun_s, stimulated
 from xb_muscle_ros.scores.estimate import Estimate, Missing, notes_of
-from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN
+from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN, noise_between
 from xb_muscle_ros.scores.twitch import twitch
 from xb_muscle_ros.trials.protocol import ALLOWED
 
@@ -59,15 +59,19 @@ class Twitches(Protocol):
             name = run.trial.facts.trial
             pulse_s, guessed = begun_s(run)
             notes += [(name, f"pulse: {guessed}")] if guessed else []
-            found = twitch(run.time_s, run.force_f0, pulse_s, run.noise)
+            noise = None if run.simulated is not None else noise_between(run.trial, float(run.time_s[0]), pulse_s)
+            found = twitch(run.time_s, run.force_f0, pulse_s, noise)
             if isinstance(found, Missing):
                 rows.append({"trial": name})
                 notes.append((name, f"twitch: {found.why}"))
                 continue
             rows.append({"trial": name, **found._asdict()})
-            if found.half_relaxation_s.value is None:
+            lacking = dict.fromkeys(each.why for each in found if each.value is None)
+            if found.peak_f0.value is None:
+                notes += [(name, f"twitch: {why}") for why in lacking]
+            elif found.half_relaxation_s.value is None:
                 notes.append((name, f"half relaxation: {found.half_relaxation_s.why}"))
-            unknown += of == MEASURED and run.noise is None
+            unknown += of == MEASURED and noise is None
         lines = notes_of(notes) + ([f"{NO_NOISE_KNOWN} ({unknown} of {len(rows)})"] if unknown else [])
         return Found(fibre, of, tuple(rows), runs=tuple(runs), notes=tuple(lines))
 

@@ -29,7 +29,7 @@ from xb_muscle_ros.protocols.inputs import calcium_um, facts_of, rate_option
 from xb_muscle_ros.protocols.stimulation import stimulated
 from xb_muscle_ros.scores.cycles import oscillations
 from xb_muscle_ros.scores.estimate import Estimate, rounded
-from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN
+from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN, ForceNoise, noise_between
 from xb_muscle_ros.scores.work_loop import Work, repeats_from, work_of
 from xb_muscle_ros.trials.protocol import Allowed
 from xb_muscle_ros.trials.trial import Array, Phase
@@ -165,8 +165,9 @@ class WorkLoops(Protocol):
             found, told = _cycles(run)
             notes += [f"trial {name}: {line}" for line in told]
             for edges in found:
+                noise = None if run.simulated is not None else _still_noise(run, found)
                 works = [
-                    work_of(run.time_s, run.length_l0, run.force_f0, begin, end, run.noise)
+                    work_of(run.time_s, run.length_l0, run.force_f0, begin, end, noise)
                     for begin, end in itertools.pairwise(edges)
                 ]
                 rows.append({"trial": name, **_row(run, edges, works)})
@@ -176,7 +177,7 @@ class WorkLoops(Protocol):
                         zip(itertools.pairwise(edges.tolist()), works, strict=True), 1
                     )
                 ]
-                unknown += run.noise is None
+                unknown += noise is None
                 curves[f"net work {len(rows)}"] = Curve(
                     np.arange(1.0, len(works) + 1.0), np.array([work.net.value for work in works], dtype=float)
                 )
@@ -228,6 +229,13 @@ class WorkLoops(Protocol):
         power.margins(y=0.2)
         legend(power)
         lettered([loops, power, cycles])
+
+
+def _still_noise(run: Run, cycles: list[Array]) -> ForceNoise | None:
+    """Noise of force before the first cycle or after the last, whichever is longer: within them force only moves."""
+    before = float(run.time_s[0]), float(cycles[0][0])
+    after = float(cycles[-1][-1]), float(run.time_s[-1])
+    return noise_between(run.trial, *max(before, after, key=lambda part: part[1] - part[0]))
 
 
 def _varied(found: Found) -> list[str]:

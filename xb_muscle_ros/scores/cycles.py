@@ -91,8 +91,8 @@ def oscillations(time_s: Array, length_l0: Array) -> list[Oscillation]:
         end = k
         while end < periods.size and _alike(periods[end], periods[k], _PERIOD) and _alike(by[end + 1], by[k], _RANGE):
             end += 1
-        if end - k >= _FEWEST:
-            starts = _extended(time_s, length_l0, times[k : end + 1], float(by[k]))
+        starts = _extended(time_s, length_l0, times[k : end + 1], float(by[k])) if end > k else times[k : end + 1]
+        if starts.size > _FEWEST:
             found.append(Oscillation(starts, best_frequency(time_s, length_l0, starts)))
         k = max(end, k + 1)
     return found

@@ -13,6 +13,8 @@ from xb_muscle_ros.trials.trial import Array
 
 _FEWEST = 4
 _FITTED = 2
+# Loads or velocities nearer to each other than this share of the largest are the same.
+_DIFFERENT, _APART = 3, 0.01
 # a/F0 of muscle is 0.1 to 0.5; where points bend the other way, or not at all, the fit ends at one of these.
 _CURVATURE = (1e-3, 100.0)
 _NEAR_BOUND = 1e-3
@@ -76,6 +78,10 @@ def fit_hill(load: Array, velocity_l0_per_s: Array, load_is_given: bool = True) 
     if f.size < _FEWEST:
         return Missing(f"shortening is known at {f.size} loads below the isometric force; {_FEWEST} are needed")
     x, y, curve = (f, v, hill_velocity) if load_is_given else (v, f, hill_force)
+    different = 1 + int(np.count_nonzero(np.diff(np.sort(x)) > _APART * float(np.max(x))))
+    if different < _DIFFERENT:
+        what = "loads" if load_is_given else "velocities"
+        return Missing(f"there are {different} different {what} of shortening; {_DIFFERENT} are needed")
     start = (0.3, float(np.max(v)) * 1.3)
     bounds = ((_CURVATURE[0], 0.2 * float(np.max(v))), (_CURVATURE[1], 100.0 * float(np.max(v))))
     try:

@@ -128,6 +128,7 @@ def _fitted(t: Array, force: Array) -> Array | None:
     found = np.array([*amplitudes(best[1]), k_quick, k_slow])
     two = k_quick >= _APART * k_slow and abs(found[1]) > _SMALLEST * float(np.ptp(force))
     alone = best[1][1] < lower[1] + 0.01
+    two &= best[1][0] < upper[0] - 0.01  # else it is over before two samples have come
     return found if two and (not alone or k_quick >= _QUICK_ALONE / span) else None
 
 

@@ -10,6 +10,7 @@ trial, and lengths and times to be without error.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import matmul_toeplitz
@@ -22,7 +23,7 @@ from xb_muscle_ros.scores.noise.trials import ENOUGH, by_windows, noise_of, stea
 from xb_muscle_ros.scores.noise.two_rates import certain, in_a_mean, two_rates
 from xb_muscle_ros.scores.noise.windows import LEAST, MOST, isometric_window
 from xb_muscle_ros.trials.hum import Line, hum
-from xb_muscle_ros.trials.trial import Array, Trial
+from xb_muscle_ros.trials.trial import Array, Phase, Trial
 
 
 class ForceNoise:
@@ -43,8 +44,10 @@ class ForceNoise:
         """By the mean over models of a trial's noise, hum aside."""
 
         def autocovariance(lags_s: Array) -> Array:
-            found: Array = certain(noise) * np.mean([each.at_lags(lags_s, step_s) for each in noise.members], axis=0)
-            return found
+            found = np.zeros(lags_s.size)
+            for each in noise.members:  # one by one: a record of an hour has as many lags as samples
+                found += each.at_lags(lags_s, step_s)
+            return found * (certain(noise) / len(noise.members))
 
         return cls(autocovariance, step_s, lines)
 
@@ -100,6 +103,16 @@ def force_noise(trial: Trial) -> ForceNoise | None:
     few = noise.samples < LEAST and steady_scatter_f0(trial) == 0.0
     unfit = noise.source is Source.DIFFERENCES or few
     return None if unfit else ForceNoise.of_models(noise, step_s)
+
+
+def noise_between(trial: Trial, from_s: float, to_s: float) -> ForceNoise | None:
+    """Noise of a trial's measured force in one part of it, in which the muscle is at rest; None where that is short."""
+    inside = (trial.force_time_s >= from_s - 5e-10) & (trial.force_time_s <= to_s + 5e-10)
+    if np.count_nonzero(inside) < LEAST:
+        return None
+    facts = replace(trial.facts, phases=(Phase("isometric", from_s, to_s),))
+    part = replace(trial, facts=facts, force_time_s=trial.force_time_s[inside], force_n=trial.force_n[inside])
+    return force_noise(part)
 
 
 NO_NOISE_KNOWN = "standard error not known: no quiet time to take the noise from"

@@ -23,6 +23,8 @@ _NARROWER = (0.0, 0.125, 0.25, 0.5, 1.0)
 _PEAK, _RISE, _FALL = 0.35, 0.1, 0.2
 _RIPPLE, _RIPPLE_S = 0.05, 0.01
 _STEPS = 5
+# Five samples tell what lasts twice as long as they do.
+_COARSE = 0.5
 
 
 _Estimates = TypeVar("_Estimates", bound=tuple[Estimate, ...])
@@ -78,16 +80,27 @@ def twitch(time_s: Array, force_f0: Array, pulse_s: float, noise: ForceNoise | N
     assert rest.value is not None
     t, force = time_s[after] - pulse_s, force_f0[after] - rest.value
     top = int(np.argmax(force))
-    if force[top] < SMALLEST_F0 or top == 0:
+    if force[top] < SMALLEST_F0:
         return Missing(f"force rises by {force[top]:.3g} F0 after the pulse; {SMALLEST_F0:g} are needed")
+    if top <= 1:
+        return Missing("the largest force comes with the pulse; an artefact of stimulation has to be cut out")
+    five_s = 4.0 * float(np.median(np.diff(t)))
+    if five_s > _COARSE * float(t[top]):
+        return Missing(f"five samples last {1e3 * five_s:.3g} ms, more than half of the time to the peak")
+    if top >= t.size - 2:
+        return _unended(rest, t)
     reach_s = max(_PEAK * float(t[top]), 2.0 * float(np.max(np.diff(t))))
     around = max(0.0, t[top] - reach_s), min(float(t[-1]), t[top] + reach_s)
     found = _peak(t, force, around, _PEAK * float(t[top]), noise)
     peak, to_peak = found.value.value, found.at_s.value
     assert peak is not None
     assert to_peak is not None
+    if to_peak >= float(t[-1]) - 0.5 * five_s:
+        return _unended(rest, t)
     rise = _narrowest(lambda width_s: (steepest(t, force, (0.0, to_peak), width_s, 1.0, noise),), _RISE * to_peak)[0]
     half = _half_relaxation(t, force, found, noise)
+    if five_s > _COARSE * (half.value or np.inf):
+        half = Estimate(None, why=f"five samples last {1e3 * five_s:.3g} ms, more than half of it")
     after_peak, most_s = (to_peak, float(t[-1])), _FALL * (half.value or float(t[-1]) - to_peak)
     fall = _narrowest(lambda width_s: (steepest(t, force, after_peak, width_s, -1.0, noise),), most_s)[0]
     over = Estimate(peak, found.value.se)
@@ -99,6 +112,12 @@ def twitch(time_s: Array, force_f0: Array, pulse_s: float, noise: ForceNoise | N
         quotient(rise, over),
         quotient(Estimate(-(fall.value or 0.0), fall.se), over),
     )
+
+
+def _unended(rest: Estimate, t: Array) -> Twitch:
+    """Of a contraction whose record ends before force falls."""
+    none = Estimate(None, why=f"force still rises where the record ends, {1e3 * t[-1]:.3g} ms after the pulse")
+    return Twitch(rest, none, none, none, none, none)
 
 
 def level_before(time_s: Array, force_f0: Array, pulse_s: float, noise: ForceNoise | None = None) -> Estimate:
@@ -183,6 +202,8 @@ def ripple(
     if np.count_nonzero(between) < _FEWEST or np.count_nonzero(last) < _FEWEST:
         return Missing(f"there are fewer than {_FEWEST} samples between two pulses")
     force, last_s = force_f0 - rest_f0, float(time_s[last][-1])
+    if int(np.argmax(force[last])) >= np.count_nonzero(last) - 1 and last_s >= float(time_s[-1]):
+        return Missing("force still rises where the record ends")
     if float(np.max(force[last])) < SMALLEST_F0:
         return Missing(f"force rises by {float(np.max(force[last])):.3g} F0; {SMALLEST_F0:g} are needed")
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from xb_muscle_ros.scores.estimate import Estimate
 from xb_muscle_ros.scores.standard_error import ForceNoise
@@ -60,8 +61,9 @@ def work_of(
     at, met = np.interp(at_s, time, length), np.interp(at_s, time, force)
     rise = np.diff(at)
     # Force in the middle of each step times its shortening.
+    falling = _falling(at)
     parts = []
-    for moving in (rise < 0.0, rise > 0.0):
+    for moving in (falling, ~falling):
         half = np.where(moving, -0.5 * rise, 0.0)
         parts.append(_on_samples(time, at_s, np.append(half, 0.0) + np.append(0.0, half)))
     weights = np.column_stack([parts[0] + parts[1], *parts])
@@ -70,6 +72,15 @@ def work_of(
     made = [Estimate(float(value), error) for value, error in zip(values, errors, strict=True)]
     mean = float(np.sum(np.diff(at_s) * 0.5 * (met[:-1] + met[1:])) / (end_s - begin_s))
     return Work(made[0], made[1], made[2], float(met.max()), mean, float(np.ptp(at)), float(at[-1] - at[0]))
+
+
+def _falling(length_l0: Array) -> npt.NDArray[np.bool_]:
+    """Steps between the longest and the next shortest length of a cycle, shape (n - 1,), whatever noise does."""
+    longest, shortest = int(np.argmax(length_l0)), int(np.argmin(length_l0))
+    step = np.arange(length_l0.size - 1)
+    if longest <= shortest:
+        return (step >= longest) & (step < shortest)
+    return (step >= longest) | (step < shortest)
 
 
 def repeats_from(works: list[Work], share: float) -> int | None:

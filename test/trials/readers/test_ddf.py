@@ -329,3 +329,11 @@ def test_a_folder_of_mixed_files_becomes_bags(tmp_path: Path) -> None:
     back = read_trial(made["m_tetanus"].bag)
     assert back.facts == made["m_tetanus"].trial.facts
     assert back.force_n == pytest.approx(0.5 * FORCE_V, abs=3e-7)
+
+
+def test_a_zero_of_force_goes_through_the_gear(tmp_path: Path) -> None:
+    plain, geared = (
+        read(ddf(tmp_path / "a.ddf"), columns={"force": {"zero": "10 mN"}}, **more)
+        for more in ({}, {"gear_ratio": 2.0})
+    )
+    assert geared.force_n == pytest.approx(2.0 * plain.force_n, abs=1e-12)

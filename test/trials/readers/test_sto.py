@@ -146,3 +146,11 @@ def test_a_folder_of_them_becomes_bags(tmp_path: Path) -> None:
     assert reader_for(tmp_path / "b.mot") is READERS["sto"]
     events = list(import_recordings(find_recordings([tmp_path]), ImportSettings(KEYS, "here"), tmp_path / "bags"))
     assert [event.bag.name for event in events if isinstance(event, Imported)] == ["a", "b"]
+
+
+def test_names_that_tell_volts_are_told(tmp_path: Path) -> None:
+    names = ("time", "length_V", "force_V")
+    trial = read(
+        sto(tmp_path / "a.sto", names=names), columns={"length": {"column": "length_V"}, "force": {"column": "force_V"}}
+    )
+    assert sum("its name tells V" in line for line in trial.warnings) == 2

@@ -128,3 +128,32 @@ def test_zero_of_a_force_in_its_own_unit(tmp_path: Path) -> None:
                "force": {"column": "f", "unit": "mN", "zero": "0.05 mN"}}  # fmt: skip
     trial = read(path, {**keys(), "columns": columns})
     assert trial.force_n == pytest.approx(1e-3 * FORCE_MN, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"f0": "0.5 V"}, "f0 is in 'V'; needed is a force in one of N, mN"),
+        ({"f0": "1 0.5mN/V"}, "f0 is in '0.5mN/V'; needed is a force"),
+        ({"reference_length": "2 V"}, "reference_length is in 'V'; needed is a length"),
+    ],
+)
+def test_amounts_are_not_in_volts(more: dict[str, Any], words: str) -> None:
+    with pytest.raises(UserError, match=words):
+        build_mapping({**keys(), **more}, "the mapping")
+    with pytest.raises(UserError, match=r"unit 'mN/V' of force lacks the number before it, for example '0.5 mN/V'"):
+        build_mapping(keys(force={"unit": "mN/V"}), "the mapping")
+
+
+def test_headers_that_spell_volts(tmp_path: Path) -> None:
+    path = table(tmp_path)
+    path.write_text(path.read_text().replace("(V)", "(Volts)"))
+    tree = keys({"column": "Length (Volts)", "unit": "mm"}, {"column": "Force (Volts)", "unit": "mN", "zero": "0 mN"})
+    assert sum("its header tells V" in line for line in read(path, tree).warnings) == 2
+
+
+def test_inspect_asks_what_zero_volts_are(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = zip(TIME_S, 2.5 + CHANGE_MM, FORCE_MN, strict=True)
+    path.write_text("t (s),length (V),force (mN)\n" + "\n".join(",".join(f"{v:.9g}" for v in row) for row in rows))
+    assert any(line.startswith("columns.length.is: what 0 V is") for line in inspect_file(path).proposal.missing)

@@ -53,11 +53,12 @@ class TwoRates(NamedTuple):
     def autocovariance(self, lags_s: Array) -> Array:
         """At lags (s, ascending), without hum, F0², shape (n,)."""
         mean_step_s = self.averaged * self.step_s
-        total = np.mean([each.at_lags(lags_s, mean_step_s) for each in self.slow.members], axis=0)
-        total *= certain(self.slow)
+        total = np.zeros(lags_s.size)
+        for each in self.slow.members:
+            total += each.at_lags(lags_s, mean_step_s)
+        total *= certain(self.slow) / len(self.slow.members)
         total += np.interp(lags_s / self.step_s, np.arange(self.beside.size), self.beside, right=0.0)
-        found: Array = total
-        return found
+        return total
 
 
 def two_rates(window: Window) -> TwoRates | None:

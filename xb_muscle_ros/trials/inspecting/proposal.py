@@ -178,6 +178,10 @@ def _length(made: Proposal, reader: Reader, contents: Contents, found: Recogniti
         else:
             made.guess(2, "is", "change", f"{why}; 'absolute' else", "columns.length.")
         return True
+    if volts_of(one.content.unit or one.named.unit, "length"):
+        told = "what 0 V is: 'change' where it is the reference length, 'absolute' where it is no length at all"
+        made.add(2, "is:", f"fill in: {told}", active=False)
+        made.missing.append(f"columns.length.is: {told}")
     return False
 
 

@@ -57,7 +57,8 @@ def read_force(
         return Force(np.empty(0), np.empty(0))
     force = signal.values * mapping.force.unit.factor
     if mapping.force_zero is not None:
-        force = force - mapping.force_zero.value
+        # The signal has been multiplied with the gear ratio by its reader.
+        force = force - mapping.force_zero.value * (mapping.gear_ratio or 1.0)
         draft.notes.append(
             f"{mapping.force_zero.value:.6g} {_BASE[mapping.force_zero.kind]} of the recorded force are its zero"
         )

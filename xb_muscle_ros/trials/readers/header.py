@@ -12,7 +12,7 @@ from xb_muscle_ros.trials.readers.calcium import SAME_PCA, pcas_in
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping, name_of
 from xb_muscle_ros.trials.readers.lines import Amount
 from xb_muscle_ros.trials.readers.mapping import f0_faults
-from xb_muscle_ros.trials.readers.units import KINDS, UNITS, Quantity, unit_of
+from xb_muscle_ros.trials.readers.units import KINDS, UNITS, Quantity, calibration, unit_of, volts_of
 
 PREFIX = "columns."
 
@@ -37,6 +37,8 @@ def scaled(signal: Signal, key: str, unit: str, column: Column, mapping: ImportM
             return signal
         found = f"is in '{unit}', which is no known unit of {key}" if unit else "has no unit"
         remedy = f"give it as {PREFIX}{key}.unit" + (f" or --{key}-unit" if key != "stimulation" else "")
+        if volts := volts_of(unit, key):
+            remedy += f", as {calibration(key, volts)}"
         raise UserError(f"{path}, {signal.name} {found}; known: {', '.join(known)}; {remedy}, or name another column")
     own = unit_of(unit, key, str(path))
     if told and column.unit != own:

@@ -19,6 +19,7 @@ from xb_muscle_ros.trials.readers.contents import Contents
 from xb_muscle_ros.trials.readers.description import ImportMapping, filled
 from xb_muscle_ros.trials.readers.lines import Rows, Text, amount, read_lines, read_rows
 from xb_muscle_ros.trials.readers.named_columns import NamedColumn, contents_of, signals_of
+from xb_muscle_ros.trials.readers.units import calibration, volts_of
 
 _NEEDED = "a storage file of OpenSim"
 _END = "endheader"
@@ -141,8 +142,19 @@ def _recording(path: Path, mapping: ImportMapping) -> Recording:
         signals,
         mapping.facts_of(path),
         (f"OpenSim storage{f' {header.title}' if header.title else ''}",),
-        (*rows.notices, *_of_rows(header, rows)),
+        (*rows.notices, *_of_rows(header, rows), *_doubts(path, mapping)),
     )
+
+
+def _doubts(path: Path, mapping: ImportMapping) -> Iterator[str]:
+    """Lines on columns whose names tell volts, which are read in something else."""
+    for key, column in mapping.columns.items():
+        volts = volts_of(read_name(column.name).unit, key)
+        if volts and volts != column.unit.per:
+            yield (
+                f"{path}: column '{column.name}' is read in {column.unit_name}, but its name tells {volts}; by "
+                f"columns.{key}.unit (--{key}-unit) give {calibration(key, volts)}"
+            )
 
 
 def _of_rows(header: StoHeader, rows: Rows) -> tuple[str, ...]:

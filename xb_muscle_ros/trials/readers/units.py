@@ -62,6 +62,8 @@ _SPELLINGS = {
     **dict.fromkeys(("F/F0", "Fo"), "F0"),
     **dict.fromkeys(("L/L0", "Lo"), "L0"),
     **dict.fromkeys(("pca", "-log[Ca]"), "pCa"),
+    **dict.fromkeys(("volt", "volts", "Volt", "Volts"), "V"),
+    **dict.fromkeys(("millivolt", "millivolts", "mVolt", "mVolts"), "mV"),
 }
 # What a volt of a length or force stands for: ``0.5 mN/V``, negative where polarity is turned.
 _CALIBRATED = ("length", "force")
@@ -98,6 +100,8 @@ def unit_of(text: str, column: str, where: str) -> Unit:
     """
     name = _simple(text)
     allowed = [known for known, unit in UNITS.items() if unit.kind in KINDS[column]]
+    if column in _CALIBRATED and name.rpartition("/")[2] in VOLTS and name.rpartition("/")[0] in allowed:
+        raise UserError(f"{where}: unit '{text}' of {column} lacks the number before it, for example '0.5 {text}'")
     volts = _PER_VOLT.fullmatch(name) if column in _CALIBRATED else None
     if volts is not None and volts["unit"] in allowed:
         number = float(volts["number"])
@@ -158,8 +162,16 @@ def reading(text: str, column: str, unit: Unit, what: str, where: str, example: 
         value = math.nan
     if match is None or not math.isfinite(value):
         raise UserError(f"{where}: {what} is '{text}'; needed is a number and its unit, for example '{example}'")
-    own = unit_of(match.group(2), column, f"{where}: {what}")
+    own = _plain_unit(match.group(2), column, what, where)
     return Quantity(value * own.factor, own.kind)
+
+
+def _plain_unit(text: str, column: str, what: str, where: str) -> Unit:
+    """A unit that is no calibration."""
+    allowed = ", ".join(known for known, unit in UNITS.items() if unit.kind in KINDS[column])
+    if text in VOLTS or _PER_VOLT.fullmatch(_simple(text)):
+        raise UserError(f"{where}: {what} is in '{text}'; needed is a {column} in one of {allowed}")
+    return unit_of(text, column, f"{where}: {what}")
 
 
 def _simple(text: str) -> str:
@@ -182,5 +194,5 @@ def quantity(text: str, column: str, what: str, where: str, example: str = "42.8
         raise UserError(
             f"{where}: {what} is '{text}'; needed is a number {least} 0 and its unit, for example '{example}'"
         )
-    unit = unit_of(match.group(2), column, f"{where}: {what}")
+    unit = _plain_unit(match.group(2), column, what, where)
     return Quantity(value * unit.factor, unit.kind)
