@@ -185,7 +185,7 @@ def _column(cells: Sequence[str | None], decimal: str) -> Array:
     """Numbers of cells, nan where one is missing or is none, shape (cells,)."""
     try:
         # Most columns hold numbers alone; Python takes 1_000 for one.
-        found = np.fromiter(map(float, cells), np.float64, len(cells))  # type: ignore[arg-type]
+        found = np.fromiter(map(float, cells), np.float64, len(cells))  # type: ignore[arg-type]  # None is caught
         if decimal != COMMA and not any("_" in cell for cell in cells if cell):
             return found
     except (TypeError, ValueError):
