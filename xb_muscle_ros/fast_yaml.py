@@ -12,7 +12,7 @@ _DUMPER: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 _NO_WRAP = 2**31 - 1
 
 
-class _OnceLoader(_SAFE_LOADER):  # type: ignore[misc]
+class _OnceLoader(_SAFE_LOADER):  # type: ignore[misc]  # one of two classes, by what is installed
     """YAML allows a key once in a mapping; PyYAML takes the last one without a word."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> Any:

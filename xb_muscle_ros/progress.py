@@ -9,7 +9,7 @@ from typing import TextIO
 from tqdm import tqdm
 
 
-class _Bar(tqdm):  # type: ignore[misc]
+class _Bar(tqdm):  # type: ignore[misc]  # tqdm has no types
     # No thread that looks after bars: this one looks at the clock with every update.
     monitor_interval = 0
 

@@ -247,8 +247,8 @@ def analyse_protocol(
     paths, found = paths_and_trials(trials)
     if paths:
         whose = fibre if isinstance(fibre, (str, Path, Fibre)) else next(iter(fibre), None)
-        told = {"reference_length": reference_length, "f0": f0, "trials_of": trials_of}
-        found = list(read_trials(paths, whose, tell=lines.say, **told))  # type: ignore[arg-type]
+        read = read_trials(paths, whose, tell=lines.say, reference_length=reference_length, f0=f0, trials_of=trials_of)
+        found = list(read)
     else:
         found = kept(found, known_of(reference_length, f0), trials_of)
     models = (model,) if isinstance(model, str) else tuple(model)

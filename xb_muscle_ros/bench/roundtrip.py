@@ -129,6 +129,7 @@ class _Pinger:
                 self._calcium.send(stamp - period // 2, self._calcium_um(k))
             sent = time.monotonic_ns()
             self._length.send(stamp, metres)
+            # mypy takes the default, which binds the stamp of this turn, for an argument of the call.
             if not self._link.wait_for(lambda stamp=stamp: self._answered[0] == stamp, 10.0):  # type: ignore[misc]
                 raise UserError(f"node {self._link.peer} left the message at {stamp * 1e-9:g} s unanswered")
             took.append((self._answered[1] - sent) * 1e-3)

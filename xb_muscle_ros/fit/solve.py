@@ -98,7 +98,7 @@ def descend(
     margin = 1e-9 * np.maximum(1.0, np.abs(upper - lower))
     inside = np.clip(z, lower + margin, upper - margin)[moving]
     # SciPy's stubs take the function for the module of the same name.
-    found: Any = scipy.optimize.least_squares(  # type: ignore[operator]
+    found: Any = scipy.optimize.least_squares(  # type: ignore[operator]  # SciPy has no types
         lambda part: objective.residuals(full(part)),
         inside,
         jac=lambda part: objective.slopes(full(part))[:, moving],

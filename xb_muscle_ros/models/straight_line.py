@@ -48,7 +48,7 @@ def straight_line(function: FunctionType) -> Any:
     define.__name__ = define.__qualname__ = function.__name__
     own = list(inspect.signature(function).parameters.values())
     first = inspect.Parameter("context", inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    define.__signature__ = inspect.Signature([first, *own])  # type: ignore[attr-defined]
+    define.__signature__ = inspect.Signature([first, *own])  # type: ignore[attr-defined]  # set, as functools does
     return intrinsic(define)
 
 

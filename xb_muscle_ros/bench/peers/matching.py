@@ -90,7 +90,7 @@ def fitted(peer: Peer, target: Target) -> dict[str, float]:
         start = bounds[0] + share * (bounds[1] - bounds[0])
         try:
             # The stubs name a module so.
-            one = least_squares(  # type: ignore[operator]
+            one = least_squares(  # type: ignore[operator]  # SciPy has no types
                 residuals, start, bounds=bounds, diff_step=3e-3, xtol=1e-4, ftol=1e-5, max_nfev=30
             )
         except UserError as error:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import rclpy
-from lifecycle_msgs.srv import GetState  # type: ignore[import-untyped, unused-ignore]
+from lifecycle_msgs.srv import GetState  # type: ignore[import-untyped, unused-ignore]  # typed on some installs only
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.context import Context
 from rclpy.parameter import Parameter, parameter_value_to_python

@@ -54,7 +54,7 @@ def fitted(mj: Any, own: tuple[float, float, float], range_l0: tuple[float, floa
     start += np.array([stretch, stretch, -stretch, 0.0, stretch])
     room = 1e-6 * (_UPPER - _LOWER)
     start = np.clip(start, _LOWER + room, _UPPER - room)
-    found = least_squares(  # type: ignore[operator]
+    found = least_squares(  # type: ignore[operator]  # SciPy has no types
         differences, start, bounds=(_LOWER, _UPPER), x_scale=(0.1, 0.1, 0.1, 1.0, 0.1)
     )
     best: Array = found.x

@@ -152,18 +152,24 @@ def reading(text: str, column: str, unit: Unit, what: str, where: str, example: 
     Raises:
         UserError: no number with a unit that fits.
     """
-    match = re.fullmatch(r"\s*(\S+)\s+(\S+)\s*", text)
-    if unit.per and match is not None and match.group(2) in VOLTS:
-        volts = finite(match.group(1), what, where) * UNITS[match.group(2)].factor / UNITS[unit.per].factor
-        return Quantity(volts * unit.factor, unit.kind)
-    try:
-        value = float(match.group(1)) if match else math.nan
-    except ValueError:
-        value = math.nan
-    if match is None or not math.isfinite(value):
+    value, name = _number_and_unit(text)
+    if not math.isfinite(value):
         raise UserError(f"{where}: {what} is '{text}'; needed is a number and its unit, for example '{example}'")
-    own = _plain_unit(match.group(2), column, what, where)
+    if unit.per and name in VOLTS:
+        return Quantity(value * UNITS[name].factor / UNITS[unit.per].factor * unit.factor, unit.kind)
+    own = _plain_unit(name, column, what, where)
     return Quantity(value * own.factor, own.kind)
+
+
+def _number_and_unit(text: str) -> tuple[float, str]:
+    """The two parts of a reading such as ``42.5 mm``; the number is NaN where it is none."""
+    parts = text.split()
+    if len(parts) != 2:
+        return math.nan, ""
+    try:
+        return float(parts[0]), parts[1]
+    except ValueError:
+        return math.nan, parts[1]
 
 
 def _plain_unit(text: str, column: str, what: str, where: str) -> Unit:
@@ -184,15 +190,11 @@ def quantity(text: str, column: str, what: str, where: str, example: str = "42.8
     Raises:
         UserError: no such number with a fitting unit; the message shows the example.
     """
-    match = re.fullmatch(r"\s*(\S+)\s+(\S+)\s*", text)
-    try:
-        value = float(match.group(1)) if match else math.nan
-    except ValueError:
-        value = math.nan
-    if match is None or not (math.isfinite(value) and (value > 0.0 or (zero and value == 0.0))):
+    value, name = _number_and_unit(text)
+    if not (math.isfinite(value) and (value > 0.0 or (zero and value == 0.0))):
         least = "from" if zero else "above"
         raise UserError(
             f"{where}: {what} is '{text}'; needed is a number {least} 0 and its unit, for example '{example}'"
         )
-    unit = _plain_unit(match.group(2), column, what, where)
+    unit = _plain_unit(name, column, what, where)
     return Quantity(value * unit.factor, unit.kind)
