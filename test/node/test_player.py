@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.errors import DataWarning, UserError
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.trials.simulated import MOMENTS
@@ -174,6 +174,30 @@ def test_a_second_publisher_is_refused(start: Callable[..., Any]) -> None:
     # The player may meet the node before it hears of the other publisher, by some seconds at most.
     with pytest.raises(UserError, match="more publishers"):
         play_live(trials, namespace=driver.namespace, domain_id=driver.domain)
+
+
+@pytest.mark.slow
+def test_who_listens_too_late_is_told_of(node: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A recorder that comes into the middle of a trial has a bag without its beginning."""
+    from xb_muscle_ros.node.client.link import Link
+    from xb_muscle_ros.node.client.player import _Player, play_live
+    from xb_muscle_ros.node.client.wires import reliable
+    from xb_muscle_ros.node.traffic import subscribe
+
+    wait = _Player._await
+    with Link("latecomer", node.namespace, node.domain) as late:
+        heard: list[Any] = []
+
+        def wait_with_company(player: _Player, window: range, *rest: Any) -> None:
+            if not heard:
+                heard.append(subscribe(late.node, "muscle/length", lambda message: None, reliable()))
+                publisher = player._driver.publisher
+                assert player._link.wait_for(lambda: publisher.get_subscription_count() > 1, 30.0)
+            wait(player, window, *rest)
+
+        monkeypatch.setattr(_Player, "_await", wait_with_company)
+        with pytest.warns(DataWarning, match=r"trial short: 1 more subscription of .*/muscle/length came while"):
+            play_live([TRIAL], namespace=node.namespace, domain_id=node.domain)
 
 
 @pytest.mark.slow

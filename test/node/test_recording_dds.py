@@ -22,6 +22,7 @@ from sensor_msgs.msg import JointState  # noqa: E402
 
 import xb_muscle_ros as xb  # noqa: E402
 from xb_muscle_ros.errors import UserError  # noqa: E402
+from xb_muscle_ros.node.client.player import _Player  # noqa: E402
 from xb_muscle_ros.node.client.process import child_environment  # noqa: E402
 from xb_muscle_ros.node.recording import record  # noqa: E402
 
@@ -117,11 +118,13 @@ def test_a_killed_recorder_leaves_what_came_before(domain: int, tmp_path: Path) 
     recorder = subprocess.Popen(command, env=child_environment(domain), stdout=subprocess.PIPE, text=True)
     try:
         with Laboratory(domain) as laboratory:
-            end = time.monotonic() + 30.0
-            while laboratory.sent < 600 and time.monotonic() < end:
+            assert recorder.stdout is not None
+            next(line for line in recorder.stdout if line.startswith("hears /muscle/length"))
+            end, first = time.monotonic() + 30.0, laboratory.sent
+            while laboratory.sent < first + 600 and time.monotonic() < end:
                 time.sleep(0.05)
             recorder.send_signal(signal.SIGKILL)
-            sent = laboratory.sent
+            sent = laboratory.sent - first
     finally:
         recorder.kill()
         recorder.communicate(timeout=10.0)
@@ -141,14 +144,18 @@ def test_ctrl_c_ends_a_recording_and_its_bag_is_whole(domain: int, tmp_path: Pat
     recorder = subprocess.Popen(command, env=child_environment(domain), stdout=subprocess.PIPE, text=True)
     try:
         with Laboratory(domain) as laboratory:
-            end = time.monotonic() + 30.0
-            while laboratory.sent < 100 and time.monotonic() < end:
+            # What was sent before the recorder knew the publisher it does not hear.
+            assert recorder.stdout is not None
+            heard = next(line for line in recorder.stdout if line.startswith("hears /muscle/length"))
+            end, sent = time.monotonic() + 30.0, laboratory.sent
+            while laboratory.sent < sent + 100 and time.monotonic() < end:
                 time.sleep(0.05)
             recorder.send_signal(signal.SIGINT)
             out, _ = recorder.communicate(timeout=20.0)
     finally:
         recorder.kill()
     assert recorder.returncode == 0
+    assert "sensor_msgs/msg/JointState" in heard
     assert "on /muscle/length" in out
     told: list[str] = []
     (trial,) = xb.read_trials(bag, reference_length="30 mm", f0="20 N", tell=told.append)
@@ -185,8 +192,17 @@ def test_environment_is_private(domain: int) -> None:
     assert os.environ["ROS_DOMAIN_ID"] == str(domain)
 
 
-def test_what_a_node_and_a_player_say_can_be_read(domain: int, tmp_path: Path) -> None:
+def test_what_a_node_and_a_player_say_can_be_read(domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Messages that are published as bytes are no longer than what is in them: no reader takes a longer one."""
+    meet = _Player.meet
+
+    def meet_recorder(player: _Player, timeout_s: float) -> None:
+        # A player does not wait for those that only listen; discovery takes DDS some seconds at times.
+        meet(player, timeout_s)
+        ends = (player._driver.publisher, player._calcium.publisher)
+        assert player._link.wait_for(lambda: all(end.get_subscription_count() > 1 for end in ends), 30.0)
+
+    monkeypatch.setattr(_Player, "meet", meet_recorder)
     node = subprocess.Popen(
         [sys.executable, "-m", "xb_muscle_ros.node.main", "--ros-args", "-p", "fiber_file:=18Dec2017a", "-p",
          "mode:=lockstep"],
@@ -208,6 +224,6 @@ def test_what_a_node_and_a_player_say_can_be_read(domain: int, tmp_path: Path) -
             process.communicate(timeout=10.0)
     (trial,) = xb.read_trials(tmp_path / "live", tell=lambda line: None)
     (run,) = made.results[0].runs
-    # The first ones may be sent before the recorder is known to the sender.
+    # The recorder may know the player a moment after the player knows the recorder.
     assert 0.2 * run.time_s.size < trial.length_m.size <= run.time_s.size
     assert trial.length_change_l0[-1] == pytest.approx(run.trial.length_change_l0[-1], abs=1e-12)

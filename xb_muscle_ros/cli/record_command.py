@@ -37,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Record, and say what was heard."""
     import signal
+    from functools import partial
 
     from xb_muscle_ros.files import refuse_older
 
@@ -61,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         signal.signal(number, lambda number, frame: asked.append(number))
     found = record(
         out, facts, topics or ros_types.TOPICS, duration_s=arguments.duration, wait_s=arguments.wait,
-        stop=lambda: bool(asked), say=print,
+        stop=lambda: bool(asked), say=partial(print, flush=True),
     )  # fmt: skip
     for line in found.lines:
         common.warn(line)

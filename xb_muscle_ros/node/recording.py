@@ -56,7 +56,7 @@ def record(
         duration_s: from the first message on, s; None: without end.
         wait_s: how long the first message is waited for, s; None: without end.
         stop: whether to end.
-        say: hears one line on each topic, when its first message comes.
+        say: hears one line once it listens, and one on each topic, when its first message comes.
 
     Raises:
         UserError: ROS cannot be used, the bag cannot be written, or no message came.
@@ -86,6 +86,7 @@ def record(
 
     with Link("muscle_recorder") as link:
         recorder = Recorder(link.node, topics, take)
+        say(f"waits for {', '.join(topics)}")
         try:
             _listen(link, recorder, kept, begun, (duration_s, wait_s), lambda: bool(problems) or stop())
         finally:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from rclpy.duration import Duration
 
-from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.errors import DataWarning, UserError
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.node.client.link import Link
 from xb_muscle_ros.node.client.wires import LoadSender, Sender, reliable
@@ -191,8 +192,18 @@ class _Player:
             {"constants.reference_length_m": facts.reference_length_m, "constants.f0_n": facts.f0_n}
         )
         for wait in (False, True):
+            listeners = self._driver.publisher.get_subscription_count()
             self._play(trial, plan, wait)
+            late = self._driver.publisher.get_subscription_count() - listeners
             account = self._link.reset()
+            if late > 0:
+                warnings.warn(
+                    f"trial {facts.trial}: {late} more subscription{'s' * (late > 1)} of "
+                    f"{self._driver.publisher.topic_name} came while the trial was played and did not hear its "
+                    "beginning; start recorders first and play the trial again",
+                    DataWarning,
+                    stacklevel=3,
+                )
             if account.calcium == self._sent_calcium and account.late == 0:
                 return Simulated(
                     time_s=trial.time_s,
