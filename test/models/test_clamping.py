@@ -121,7 +121,9 @@ def test_a_slack_spring_under_no_load_is_just_not_slack() -> None:
     # Faster than under 2 % of the isometric force, by little.
     loaded = clamp_run(muscle, start, np.full(40, 1e-3), np.full(41, 0.02), np.full(41, 30.0))
     assert states[-1, -2] < loaded[-1, -2] < 0.5 * states[-1, -2] < 0.0
-    with pytest.raises(UserError, match=r"load of -0.01 F0 is less than the fibre bears at any length change down to"):
+    with pytest.raises(
+        UserError, match=r"load of -0.01 F0 is less than the fibre bears at any length change from its own down to"
+    ):
         clamp(muscle, start, -0.01, 30.0, 1e-3)
 
 
@@ -173,7 +175,9 @@ def test_a_load_beyond_what_a_fibre_bears_says_so_with_its_time() -> None:
     with pytest.raises(UserError) as error:
         clamp_run(muscle, start, np.full(200, 1e-3), load, np.full(201, 1.0))
     assert "fibre 18Dec2017a: load of 1.31047 F0 at t = 0.0" in str(error.value)
-    assert "is more than the fibre bears at any length change up to 0.5 L0: the most is " in str(error.value)
+    assert "is more than the fibre bears at any length change from its own up to 0.5 L0: the most is " in str(
+        error.value
+    )
     # As far as it is borne, it is held.
     time = float(str(error.value).split("t = ")[1].split(" s")[0])
     count = round(time / 1e-3)
@@ -183,6 +187,105 @@ def test_a_load_beyond_what_a_fibre_bears_says_so_with_its_time() -> None:
         clamp_run(muscle, start, np.full(200, 1e-3), load, np.full(201, 1.0), limits_l0=(-0.5, 0.05))
     with pytest.raises(UserError, match=r"load of 50 F0 is more than the fibre bears .* give a smaller load"):
         clamp(muscle_of("hill"), muscle_of("hill").settle(0.0, 1.0), 50.0, 1.0, 1e-3)
+
+
+def first_crossing(muscle: Muscle, state: np.ndarray, load: float, calcium: float, dt: float) -> tuple[float, float]:
+    """Between which lengths, 2e-4 L0 apart, force first comes to a load on the way from the length that the fibre has.
+
+    Scanned from there, longer where it bears too little and shorter where it bears too much; NaN where it never does.
+    """
+
+    def excess(length: float) -> float:
+        try:
+            return muscle.outputs(muscle.step(state, length, calcium, dt)).force_f0 - load
+        except UserError:
+            return math.nan
+
+    at = float(state[-3])
+    first = excess(at)
+    stride = math.copysign(2e-4, -first)
+    while abs(at + stride) <= 0.5:
+        there = excess(at + stride)
+        if math.isnan(there):
+            break
+        if (there < 0.0) != (first < 0.0):
+            return min(at, at + stride), max(at, at + stride)
+        at += stride
+    return math.nan, math.nan
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("model", "method"),
+    [
+        ("3state_coop", "gaussian"),
+        ("2state_coop", "gaussian"),
+        ("4state_coop", "gaussian"),
+        ("hill_se", "gaussian"),
+        ("3state_coop_slack", "gaussian"),
+        ("3state_coop_slack+passive_force_length", "gaussian"),
+        ("3state_coop_rigid+passive_force_length", "gaussian"),
+        ("3state_coop", "characteristics"),
+        ("3state_coop", "fixed_grid"),
+    ],
+)
+def test_the_length_is_the_first_on_the_way_and_what_is_refused_has_none(model: str, method: str) -> None:
+    """Loads that come and go, by what every length on the way gives."""
+    muscle, rng = Muscle(fibre_for(model, method, 0.0)), np.random.default_rng(7)
+    held = 0
+    for _ in range(12):
+        calcium = float(rng.choice([30.0, 1.0, 0.8]))
+        state = muscle.settle(0.0, calcium)
+        isometric = muscle.outputs(state).force_f0
+        for _ in range(10):
+            share = rng.choice([rng.uniform(0.0, 0.1), rng.uniform(0.02, 1.3), 1.0, 0.8])
+            load, dt = float(share * isometric), float(rng.choice([2e-4, 1e-3, 5e-3]))
+            shorter, longer = first_crossing(muscle, state, load, calcium, dt)
+            if math.isnan(shorter):
+                with pytest.raises(UserError, match="than the fibre bears"):
+                    clamp(muscle, state, load, calcium, dt)
+                break
+            state = clamp(muscle, state, load, calcium, dt)
+            held += 1
+            assert shorter - 1e-9 <= state[-3] <= longer + 1e-9
+    assert held > 40
+
+
+def test_a_load_that_comes_back_after_a_release_is_borne() -> None:
+    """Regression: after fast lengthening the search began beyond force's peak, and went on from there."""
+    muscle = Muscle(load_fibre(FIBRE))
+    start = muscle.settle(0.0, 1.0)
+    isometric = muscle.outputs(start).force_f0
+    load = np.concatenate([np.zeros(21), np.full(2, isometric)])
+    states = clamp_run(muscle, start, np.full(22, 1e-3), load, np.full(23, 1.0))
+    np.testing.assert_allclose(force_of(muscle, states[1:]), load[1:], atol=1e-6)
+    assert states[-1, -3] == pytest.approx(0.0178, abs=1e-3)
+    muscle = muscle_of("2state_coop")
+    start = muscle.settle(0.0, 1.0)
+    isometric = muscle.outputs(start).force_f0
+    released = clamp(muscle, start, 0.0, 1.0, 1e-3)
+    assert clamp(muscle, released, 0.8 * isometric, 1.0, 1e-3)[-3] == pytest.approx(-0.0045, abs=1e-3)
+
+
+def test_a_fibre_does_not_jump_to_where_its_passive_element_bears_the_load() -> None:
+    """Regression: secants grew along the slack part and went over force's peak, by 0.3 L0 within 1 ms."""
+    muscle = Muscle(fibre_for("3state_coop_slack+passive_force_length", "gaussian", 0.0))
+    start = muscle.settle(0.0, 30.0)
+    isometric = muscle.outputs(start).force_f0
+    released = clamp(muscle, start, 0.02 * isometric, 30.0, 1e-3)
+    assert clamp(muscle, released, 0.8 * isometric, 30.0, 1e-3)[-3] == pytest.approx(-0.0067, abs=1e-3)
+
+
+def test_the_most_that_is_borne_is_told() -> None:
+    """A load just below force's peak within a step is held, and one above it is refused with the peak."""
+    muscle = muscle_of()
+    start = muscle.settle(0.0, 30.0)
+    forces = [muscle.outputs(muscle.step(start, x, 30.0, 1e-3)).force_f0 for x in np.arange(0.0, 0.3, 1e-3)]
+    below, peak = max(forces) - 0.05, max(forces)
+    assert muscle.outputs(clamp(muscle, start, below, 30.0, 1e-3)).force_f0 == pytest.approx(below, abs=1e-8)
+    with pytest.raises(UserError, match="the most is ") as error:
+        clamp(muscle, start, 10.0, 30.0, 1e-3)
+    assert float(str(error.value).split("the most is ")[1].split(" F0")[0]) == pytest.approx(peak, rel=2e-3)
 
 
 def test_a_state_at_fault_is_named_as_by_a_step() -> None:
@@ -210,6 +313,8 @@ def test_values_that_no_clamp_takes_are_refused() -> None:
         with pytest.raises(UserError, match=message):
             clamp(muscle, start, **{**good, **wrong})
     many = np.full(3, 1e-3), np.full(4, 0.3), np.full(4, 1.0)
+    with pytest.raises(UserError, match="every is 0; allowed is 1 and above"):
+        clamp_run(muscle, start, *many, every=0)
     for k, values, message in (
         (1, np.array([0.3, 0.3, math.nan, 0.3]), "fibre 18Dec2017a, sample 2: load is nan F0"),
         (1, np.full(3, 0.3), "3 loads and 4 values of calcium"),
@@ -220,6 +325,26 @@ def test_values_that_no_clamp_takes_are_refused() -> None:
         arguments[k] = values
         with pytest.raises(UserError, match=message):
             clamp_run(muscle, start, *arguments)
+
+
+def test_what_is_no_state_of_the_fibre_is_refused() -> None:
+    """Regression: compiled loops read beyond a short state, and whole numbers cut what they wrote."""
+    muscle = muscle_of()
+    start = muscle.settle(0.0, 1.0)
+    dt, ones = np.full(3, 1e-3), np.ones(4)
+    calls: list[Any] = [
+        lambda state: clamp(muscle, state, 0.3, 1.0, 1e-3),
+        lambda state: clamp_run(muscle, state, dt, 0.3 * ones, ones),
+        lambda state: muscle.step(state, 0.0, 1.0, 1e-3),
+        lambda state: muscle.run(state, dt, 0.0 * ones, ones),
+        lambda state: muscle.follow(state, np.arange(4.0), 0.0 * ones, ones, np.arange(4.0)),
+        muscle.outputs,
+    ]
+    for call in calls:
+        call(start)
+        for wrong in (start[:-1], start.astype(int), start[None], [0.0]):
+            with pytest.raises(UserError, match=r"model 3state_coop: a state is float64 of shape \(\d+,\), not"):
+                call(wrong)
 
 
 @settings(max_examples=200)

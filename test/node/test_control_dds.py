@@ -98,6 +98,33 @@ def test_a_protocol_through_a_node(
         assert one.force_f0.tolist() == other.force_f0.tolist()
 
 
+def test_a_load_that_is_not_borne_leaves_the_others(
+    new_domain: Callable[[], int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As offline, with the node's reason, and without waiting for an answer that never comes."""
+    import xb_muscle_ros as xb
+    from xb_muscle_ros.node.client.process import NodeProcess
+
+    domain = new_domain()
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+    # The load begins between two samples.
+    options = {"load": [0.2, 2.9, 0.6], "rate": 1000.0, "hold": 0.1, "lead": 0.1003}
+    told: list[str] = []
+    (offline,) = xb.run_protocol("force-clamp", FIBRE, tell=told.append, **options).results
+    (left_out,) = [line for line in told if "is left out" in line]
+    told.clear()
+    with NodeProcess(domain, {"fiber_file": FIBRE, "mode": "lockstep", "control": "force"}):
+        (live,) = xb.run_protocol("force-clamp", FIBRE, live=True, tell=told.append, **options).results
+    (line,) = [line for line in told if "is left out" in line]
+    assert line.startswith("trial clamp_load2900_pca45: node /muscle_node stopped: fibre 18Dec2017a: load of ")
+    assert "is more than the fibre bears" in line
+    assert "is more than the fibre bears" in left_out
+    assert live.column("load") == pytest.approx(offline.column("load"), abs=1e-8)
+    assert live.column("shortening_l0_per_s") == pytest.approx(offline.column("shortening_l0_per_s"), rel=1e-8)
+    for one, other in zip(live.runs, offline.runs, strict=True):
+        assert one.setting("load_f0") == pytest.approx(other.setting("load_f0"), abs=1e-8)
+
+
 def test_the_other_control_is_one_line(new_domain: Callable[[], int], monkeypatch: pytest.MonkeyPatch) -> None:
     import xb_muscle_ros as xb
     from xb_muscle_ros.node.client.process import NodeProcess

@@ -89,6 +89,8 @@ def test_arrays_by_name_in_any_order(three: Any) -> None:
 def test_some_names_strangers_and_bad_values(three: Any) -> None:
     """Who is not named does not move; strangers are reported once; a bad value costs its fibre this sample only."""
     three.link.reset()
+    # While both sides came to know each other the node may have refused a length whose calcium it had not heard.
+    earlier = int(three.report(lambda r: True)["refused"])
     three.send("calcium", 0.0, 5.0, 5.0, 5.0, name=[])
     assert list(three.ask(1.0, 1.0, 1.0, 1.0, name=[]).name) == NAMES
     answer = three.ask(1.001, 1.001, 7.0, name=["right", "ghost"])
@@ -102,7 +104,7 @@ def test_some_names_strangers_and_bad_values(three: Any) -> None:
     assert log.count("names ignored: ghost; this node has fibres left, right, back") == 1
     assert "length of right refused (not finite, 1 so far)" in log
     report = three.report(lambda r: r.get("refused: wrong array size") == "1")
-    assert (report["fibres"], report["ignored names"], report["refused"]) == ("3", "1", "2")
+    assert (report["fibres"], report["ignored names"], int(report["refused"]) - earlier) == ("3", "1", 2)
 
 
 def test_every_fibre_has_its_parameters(three: Any) -> None:

@@ -180,22 +180,22 @@ def test_a_second_publisher_is_refused(start: Callable[..., Any]) -> None:
 def test_who_listens_too_late_is_told_of(node: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A recorder that comes into the middle of a trial has a bag without its beginning."""
     from xb_muscle_ros.node.client.link import Link
-    from xb_muscle_ros.node.client.player import _Player, play_live
+    from xb_muscle_ros.node.client.player import Player, play_live
     from xb_muscle_ros.node.client.wires import reliable
     from xb_muscle_ros.node.traffic import subscribe
 
-    wait = _Player._await
+    wait = Player._await
     with Link("latecomer", node.namespace, node.domain) as late:
         heard: list[Any] = []
 
-        def wait_with_company(player: _Player, window: range, *rest: Any) -> None:
+        def wait_with_company(player: Player, window: range, *rest: Any) -> None:
             if not heard:
                 heard.append(subscribe(late.node, "muscle/length", lambda message: None, reliable()))
                 publisher = player._driver.publisher
                 assert player._link.wait_for(lambda: publisher.get_subscription_count() > 1, 30.0)
             wait(player, window, *rest)
 
-        monkeypatch.setattr(_Player, "_await", wait_with_company)
+        monkeypatch.setattr(Player, "_await", wait_with_company)
         with pytest.warns(DataWarning, match=r"trial short: 1 more subscription of .*/muscle/length came while"):
             play_live([TRIAL], namespace=node.namespace, domain_id=node.domain)
 
@@ -220,7 +220,7 @@ def test_no_answer_names_trial_and_stamp(node: Any) -> None:
 )
 def test_a_trial_that_cannot_travel_is_refused(change: dict[str, Any], words: str, domain: int) -> None:
     """Before anything is sent."""
-    from xb_muscle_ros.node.client.player import _Plan
+    from xb_muscle_ros.node.client.travelling import Plan
 
     with pytest.raises(UserError, match=words):
-        _Plan.of(dataclasses.replace(TRIAL, **change))
+        Plan.of(dataclasses.replace(TRIAL, **change))

@@ -22,7 +22,7 @@ from sensor_msgs.msg import JointState  # noqa: E402
 
 import xb_muscle_ros as xb  # noqa: E402
 from xb_muscle_ros.errors import UserError  # noqa: E402
-from xb_muscle_ros.node.client.player import _Player  # noqa: E402
+from xb_muscle_ros.node.client.player import Player  # noqa: E402
 from xb_muscle_ros.node.client.process import child_environment  # noqa: E402
 from xb_muscle_ros.node.recording import record  # noqa: E402
 
@@ -194,15 +194,15 @@ def test_environment_is_private(domain: int) -> None:
 
 def test_what_a_node_and_a_player_say_can_be_read(domain: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Messages that are published as bytes are no longer than what is in them: no reader takes a longer one."""
-    meet = _Player.meet
+    meet = Player.meet
 
-    def meet_recorder(player: _Player, timeout_s: float) -> None:
+    def meet_recorder(player: Player, timeout_s: float) -> None:
         # A player does not wait for those that only listen; discovery takes DDS some seconds at times.
         meet(player, timeout_s)
         ends = (player._driver.publisher, player._calcium.publisher)
         assert player._link.wait_for(lambda: all(end.get_subscription_count() > 1 for end in ends), 30.0)
 
-    monkeypatch.setattr(_Player, "meet", meet_recorder)
+    monkeypatch.setattr(Player, "meet", meet_recorder)
     node = subprocess.Popen(
         [sys.executable, "-m", "xb_muscle_ros.node.main", "--ros-args", "-p", "fiber_file:=18Dec2017a", "-p",
          "mode:=lockstep"],

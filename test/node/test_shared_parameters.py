@@ -176,6 +176,25 @@ def test_quality_of_service_without_effect_is_named() -> None:
     assert all(name in text for name in (*idle, "/muscle/length.subscription", "/muscle/force.publisher"))
 
 
+def test_quality_of_service_under_force_control(gate: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Regression: loads were unknown there: what had an effect was said to have none, and typing errors passed."""
+    from xb_muscle_ros.node import parameter_gate
+
+    looked: list[object] = []
+    look = parameter_gate.look_at_overrides
+    monkeypatch.setattr(parameter_gate, "look_at_overrides", lambda node, control: looked.append(look(node, control)))
+    told_of: list[str] = []
+    monkeypatch.setattr("xb_muscle_ros.node.qos_overrides.told", lambda names, *rest: told_of.extend(names) or "")
+    ends = {"/muscle/load.subscription": 1, "/muscle/length.publisher": 1, "/muscle/length.subscription": 0}
+    for end, is_there in ends.items():
+        told_of.clear()
+        gate(**{"fiber_file": "18Dec2017a", "control": "force", f"qos_overrides.{end}.depth": 5})
+        assert told_of == ([] if is_there else [f"qos_overrides.{end}.depth"])
+    gate(**{"fiber_file": "18Dec2017a", "control": "force", "qos_overrides./muscle/load.subscription.relibility": "x"})
+    assert "mean 'reliability'?" in str(looked[-1])
+    assert looked[:-1] == [None] * 3
+
+
 def test_wrong_quality_of_service_fails_the_configuration(gate: Callable[..., Any]) -> None:
     """In words of the parameter rather than of the middleware."""
     from rclpy.lifecycle import TransitionCallbackReturn

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from functools import partial
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.protocols import running
-from xb_muscle_ros.protocols.base import Planned, Protocol, Run, run_of
+from xb_muscle_ros.protocols.base import NoAnswer, Planned, Protocol, Run
 
 
 def answers(
@@ -33,15 +33,20 @@ def answers(
         return
     if settle is not None:
         raise UserError("--live leaves settling to the node; drop --settle")
-    # The one place where this module touches ROS, and only when asked to.
-    from xb_muscle_ros.node.client.player import play_live, play_loads
-
-    trials = [each.trial for each in planned]
-    if planned and planned[0].load.size:
-        for trial, (simulated, length_m) in zip(
-            trials, play_loads(trials, [each.load for each in planned], fibre), strict=True
-        ):
-            yield running.with_force(run_of(replace(trial, length_m=length_m), simulated), fibre, as_measured)
+    if not planned:
         return
-    for trial, simulated in zip(trials, play_live(trials, fibre), strict=True):
-        yield running.with_force(run_of(trial, simulated), fibre, as_measured)
+    # The one place where this module touches ROS, and only when asked to.
+    from xb_muscle_ros.node.client.player import Player, Stopped, playing
+
+    def ask(player: Player, each: Planned) -> Run:
+        by_load = bool(each.load.size)
+        try:
+            simulated = player.play(each.trial, each.load if by_load else None)
+        except Stopped as problem:
+            raise NoAnswer(str(problem)) from problem
+        return protocol.answered(each, simulated, player.length_m if by_load else None)
+
+    topic = "load" if planned[0].load.size else "length"
+    with playing([each.trial for each in planned], fibre, topic=topic) as player:
+        for run in running.answered((partial(ask, player, each) for each in planned), lacking):
+            yield running.with_force(run, fibre, as_measured)

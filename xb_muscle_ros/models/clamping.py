@@ -19,7 +19,7 @@ LIMITS_L0 = (-0.5, 0.5)
 """Length changes between which a load is borne, L0: half a fibre length either way, past which none does its work."""
 
 # Result codes of `stepping.clamp_kernels`; those below are of any step.
-_TOO_WEAK, _TOO_STRONG = 4, 5
+_TOO_WEAK, _TOO_STRONG, _NOT_HELD, _WEAK_TO_END, _STRONG_TO_END = 4, 5, 6, 7, 8
 
 
 def clamp(
@@ -37,8 +37,9 @@ def clamp(
     state is the one that `Muscle.step` gives for the length found, bit for bit. Only if it jumps by more than 2e-6 F0
     are smaller steps taken within, and `Muscle.step` then comes as near as its own error.
 
-    Of several such lengths, counted from where the last velocity leads, the first at which force rises with length is
-    taken. Of a slack spring under no load this is the least slack one.
+    Of several such lengths that one is taken which a fibre comes to first that bears too little at its length and
+    lengthens, or too much and shortens; trials 0.002 L0 apart look for it. Of a slack spring under no load this is the
+    least slack one. Past a peak of force a fibre is not carried on to where a passive element bears the load.
 
     Args:
         muscle: the fibre.
@@ -49,13 +50,14 @@ def clamp(
         limits_l0: shortest and longest length change that the apparatus and the fibre allow, L0.
 
     Raises:
-        UserError: a value out of range, or a load that no length within the limits gives. A load above what the fibre
-            bears lengthens it step by step until the limit is reached.
+        UserError: a value out of range, no state of this fibre, or a load that no length on the way to the limit gives.
+            A load above what the fibre bears lengthens it step by step until the limit is reached.
         StateViolation: see `Muscle.step`.
     """
     name = muscle.fibre.name
     check(name, 0.0, calcium_um, dt_s)
     check_load(name, load_f0)
+    muscle.check_state(state)
     check_limits(name, *limits_l0)
     out = np.empty_like(state)
     code, fault, value, length, _, _ = muscle.code.clamp(
@@ -99,6 +101,7 @@ def clamp_run(
     dt, load, calcium = (np.ascontiguousarray(a, dtype=np.float64) for a in (dt_s, load_f0, calcium_um))
     check_loads(name, dt, load, calcium)
     check_limits(name, *limits_l0)
+    muscle.check_state(state, every)
     states = np.zeros(((load.size - 1) // every + 1, state.size))
     code, fault, value, length, steps, halvings, k = muscle.code.clamp_run(
         state, dt, load, calcium, *map(float, limits_l0), muscle.parameters, GUARD, every, states, _shown(), muscle.work
@@ -123,22 +126,26 @@ def _complain(load: str, code: int, force_f0: float, length_l0: float, limits_l0
     Args:
         load: begins the message.
         code: result code of the compiled loops.
-        force_f0, length_l0: the force nearest to the load that a length gave, F0, and that length change, L0.
+        force_f0, length_l0: the force nearest to the load that a length gave, F0, and that length change, L0; or the
+            last one that a step led to.
         limits_l0: of the length change, L0.
 
     Raises:
         UserError: always.
     """
     shortest, longest = limits_l0
-    if code == _TOO_WEAK:
+    end = f"{length_l0:.4g} L0, past which the model has no step"
+    if code in (_TOO_WEAK, _WEAK_TO_END):
+        to, where = (f"{longest:g} L0", f", at {length_l0:.4g} L0") if code == _TOO_WEAK else (end, "")
         raise UserError(
-            f"{load} is more than the fibre bears at any length change up to {longest:g} L0: the most is "
-            f"{force_f0:.4g} F0, at {length_l0:.4g} L0; give a smaller load, more calcium or a wider limit"
+            f"{load} is more than the fibre bears at any length change from its own up to {to}: the most is "
+            f"{force_f0:.4g} F0{where}; give a smaller load, more calcium or a shorter step"
         )
-    if code == _TOO_STRONG:
+    if code in (_TOO_STRONG, _STRONG_TO_END):
+        to, where = (f"{shortest:g} L0", f", at {length_l0:.4g} L0") if code == _TOO_STRONG else (end, "")
         raise UserError(
-            f"{load} is less than the fibre bears at any length change down to {shortest:g} L0: the least is "
-            f"{force_f0:.4g} F0, at {length_l0:.4g} L0; give a larger load, less time or a wider limit"
+            f"{load} is less than the fibre bears at any length change from its own down to {to}: the least is "
+            f"{force_f0:.4g} F0{where}; give a larger load or less time"
         )
     raise UserError(
         f"{load} lies where force jumps: the nearest is {force_f0:.9g} F0, at a length change of {length_l0:.6g} L0; "

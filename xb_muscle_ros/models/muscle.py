@@ -19,6 +19,7 @@ from xb_muscle_ros.models.registry import compose, model_of_set
 Array = npt.NDArray[np.float64]
 
 # The fixed stepper's guard: an embedded error of 1e-4 is 0.02 % of F0; smooth input at 1 ms stays 100 times below it.
+_DOUBLE = np.dtype(np.float64)
 GUARD = 1e-4
 SCRATCH_ROWS = 14  # four for the loops, the others for a model's step
 _LONGEST_SETTLING_S = 1e6
@@ -71,6 +72,7 @@ class Muscle:
         self._settling = composition.settling
         self._states = composition.state_rows(fibre.values)
         self._n = len(self._states) + 3
+        self._shape = (self._n,)
         self._out = np.zeros(len(Outputs._fields))
         if self.code not in _WARM:
             # One short step now, so that the first real one finds everything compiled.
@@ -169,14 +171,20 @@ class Muscle:
         the step is halved as often as needed, so that the result holds for any input. Nothing is clipped.
 
         Raises:
-            UserError: length, calcium or duration out of range.
+            UserError: length, calcium or duration out of range, or no state of this fibre.
             StateViolation: no step size leads to an allowed state; names fibre, state and time within the step.
         """
         check(self.fibre.name, length_change_l0, calcium_um, dt_s)
+        self.check_state(state)
         return self._advance(state, length_change_l0, calcium_um, dt_s, dt_s, GUARD)
 
     def outputs(self, state: Array) -> Outputs:
-        """Forces, contractile element and distribution at a state."""
+        """Forces, contractile element and distribution at a state.
+
+        Raises:
+            UserError: no state of this fibre.
+        """
+        self.check_state(state)
         self.code.outputs(state, self.parameters, self._out)
         return Outputs(*self._out.tolist())
 
@@ -210,9 +218,10 @@ class Muscle:
             begin_s: time of the first sample, s, where a fault is told.
 
         Raises:
-            UserError: see `inputs.check_samples`.
+            UserError: see `inputs.check_samples` and `check_state`.
             StateViolation: see `step`; the time counts from the first sample.
         """
+        self.check_state(state, every)
         states = np.zeros(((length_change_l0.size - 1) // every + 1, self._n))
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (dt_s, length_change_l0, calcium_um)]
         check_samples(self.fibre.name, arrays[0], arrays[1], arrays[2])
@@ -247,9 +256,10 @@ class Muscle:
             counts: see `run`.
 
         Raises:
-            UserError: see `inputs.check_samples`.
+            UserError: see `inputs.check_samples` and `check_state`.
             StateViolation: see `step`.
         """
+        self.check_state(state)
         states = np.zeros((sample_s.size, self._n))
         arrays = [np.ascontiguousarray(a, dtype=np.float64) for a in (corner_s, length_change_l0, calcium_um, sample_s)]
         check_samples(self.fibre.name, np.diff(arrays[0]), arrays[1], arrays[2])
@@ -284,6 +294,24 @@ class Muscle:
         if code != 0:
             self.complain(code, fault, t, out)
         return out
+
+    def check_state(self, state: Array, every: int = 1) -> None:
+        """See whether compiled loops may be given a state, which they take as it is; some 0.1 µs.
+
+        Args:
+            every: stride of the samples whose states are asked for.
+
+        Raises:
+            UserError: it is of another model, no array of 64-bit numbers, or the stride is below 1.
+        """
+        if type(state) is not np.ndarray or state.shape != self._shape or state.dtype != _DOUBLE:
+            found = f"{getattr(state, 'dtype', type(state).__name__)} of shape {getattr(state, 'shape', '?')}"
+            raise UserError(
+                f"fibre {self.fibre.name}, model {self.fibre.model}: a state is float64 of shape ({self._n},), not "
+                f"{found}; take it from settle, rest, step or run of this model"
+            )
+        if every < 1:
+            raise UserError(f"fibre {self.fibre.name}: every is {every}; allowed is 1 and above")
 
     def complain(self, code: int, fault: int, time_s: float, state: Array) -> NoReturn:
         """Raise what a result code of the compiled loops means.

@@ -16,6 +16,9 @@ from xb_muscle_ros.node.status import Status
 _LASTING_S = 1.0
 
 
+_STOPPED, _AGAIN = "stopped: ", "; call ~/reset to start again"
+
+
 @dataclass
 class Report:
     """Everything a report is made from.
@@ -69,6 +72,12 @@ def status_name(node: str) -> str:
     return f"{node.lstrip('/')}: stepping"
 
 
+def fault_in(status: DiagnosticStatus) -> str:
+    """Why stepping stopped, as the node's status tells it; empty where it did not."""
+    text = str(status.message)
+    return text.removeprefix(_STOPPED).removesuffix(_AGAIN) if text.startswith(_STOPPED) else ""
+
+
 def diagnostics(report: Report) -> DiagnosticArray:
     """Message for ``/diagnostics``; the sender adds the stamp."""
     level, text = _verdict(report)
@@ -91,7 +100,7 @@ def _verdict(report: Report) -> tuple[bytes, str]:
     if status is None or report.state != "active":
         return DiagnosticStatus.OK, report.state
     if status.fault:
-        return DiagnosticStatus.ERROR, f"stopped: {status.fault}; call ~/reset to start again"
+        return DiagnosticStatus.ERROR, f"{_STOPPED}{status.fault}{_AGAIN}"
     remarks = [status.waiting] if status.waiting else []
     level = DiagnosticStatus.WARN
     age_s = report.input_age_s

@@ -61,14 +61,14 @@ def muscle_description(
         where = {key: LaunchConfiguration(key) for key in ("name", "namespace")}
         return [node(context, "muscle_node", values({**OF_MUSCLES, **kinds}), **where)]
 
-    mode = "realtime: steps at rate_hz; lockstep: one step per length message"
-    on_timeout = "what happens then: length as sampled, length as it is, or that and calcium falling to zero"
+    mode = "realtime: steps at rate_hz; lockstep: one step per length (or load) message"
+    on_timeout = "what happens then: length (or load) as sampled, length as it is, or that and calcium falling to zero"
     arguments = [
         *own,
         argument("mode", "realtime", mode, ["realtime", "lockstep"]),
         argument("control", "length", "length: length in, force out; force: load in, length out", ["length", "force"]),
         argument("rate_hz", rate_hz, "steps per second in realtime mode"),
-        argument("timeout_s", "0.0", "age at which a length sample is too old; 0: no age is"),
+        argument("timeout_s", "0.0", "age at which a length (or load) sample is too old; 0: no age is"),
         argument("on_timeout", "isometric", on_timeout, ["hold", "isometric", "decay"]),
         argument("state_file", "", "file of ~/save_state and ~/load_state"),
         argument("load_state_at_start", "false", "go on with what is in state_file"),

@@ -137,7 +137,9 @@ class Lockstep:
         if self._back:
             which = sorted(i for back, _, _ in self._back for i in back)
             taken = _total((back, account) for back, _, account in self._back)
-            self._log.warning(front(self._names, which) + time_went_back(self._back[0][1], stamp, taken))
+            self._log.warning(
+                front(self._names, which) + time_went_back(self._back[0][1], stamp, taken, self._control.topic)
+            )
             self._back.clear()
             self._use_scales()
         done, states = self._stepped(plans, troubles)

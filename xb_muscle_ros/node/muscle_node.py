@@ -242,8 +242,9 @@ class MuscleNode(LifecycleNode):
             self._listening.reset()
         response.success = True
         constants = _constants(self._gate.fibres)
+        topic = self._control.topic
         response.message = (
-            f"state forgotten after {account}; the next {self._control.topic} sample settles anew; {constants}"
+            f"state forgotten after {account.told(topic)}; the next {topic} sample settles anew; {constants}"
         )
         return response
 

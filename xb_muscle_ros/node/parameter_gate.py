@@ -75,7 +75,7 @@ class ParameterGate:
         for name in overrides:
             node.undeclare_parameter(name)
         self._declare_own(overrides)
-        self.error = self.error or look_at_overrides(node)
+        self.error = self.error or look_at_overrides(node, self.value("control"))
         for name, value in self._own_of(overrides).items():
             self._give(name, value)
         for name in TEXTS:

@@ -15,12 +15,15 @@ from xb_muscle_ros.node.foreign_keys import shortened
 PREFIX = "qos_overrides."
 POLICIES = (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
 
-# By topic, as the node names them: what it is there.
-ENDS: Mapping[str, str] = {
-    "muscle/length": "subscription",
+# By topic, as the node names them: what it is there, whatever drives it, and by the parameter ``control``.
+_ENDS: Mapping[str, str] = {
     "muscle/calcium": "subscription",
     "muscle/force": "publisher",
     "muscle/moments": "publisher",
+}
+_DRIVEN: Mapping[str, Mapping[str, str]] = {
+    "length": {"muscle/length": "subscription"},
+    "force": {"muscle/load": "subscription", "muscle/length": "publisher"},
 }
 
 # Their overrides are rclpy's own affair, and a dump has them.
@@ -29,9 +32,13 @@ _CHOICES = {"history": QoSHistoryPolicy, "reliability": QoSReliabilityPolicy, "d
 _DEPTH = (1, 1_000_000)
 
 
-def look_at_overrides(node: Any) -> UserError | None:
-    """Check what a node was given, and warn of what concerns nothing it has; returns what is wrong."""
-    ends = {node.resolve_topic_name(topic): end for topic, end in ENDS.items()}
+def look_at_overrides(node: Any, control: str) -> UserError | None:
+    """Check what a node was given, and warn of what concerns nothing it has; returns what is wrong.
+
+    Args:
+        control: the parameter.
+    """
+    ends = {node.resolve_topic_name(topic): end for topic, end in {**_DRIVEN[control], **_ENDS}.items()}
     given = {f"{PREFIX}{name}": p.value for name, p in node.get_parameters_by_prefix(PREFIX[:-1]).items()}
     try:
         idle = without_effect(given, ends)

@@ -232,5 +232,5 @@ class Samples:
         last = int(self._length_stamps[back[0]])
         taken = Account(*self.taken[back].sum(axis=0).tolist())
         self.counts["time went back"] += len(back)
-        self._log.warning(front(self._names, back.tolist()) + time_went_back(last, stamp, taken))
+        self._log.warning(front(self._names, back.tolist()) + time_went_back(last, stamp, taken, self._control.topic))
         self.forget(back)

@@ -58,7 +58,7 @@ class Account(NamedTuple):
     """How many samples were taken since the last reset.
 
     Attributes:
-        length, calcium: samples of each.
+        length, calcium: samples of each; under force control the first are loads.
         late: calcium samples that came after the step that should have used them.
     """
 
@@ -67,20 +67,24 @@ class Account(NamedTuple):
     late: int = 0
 
     def __str__(self) -> str:
-        return f"{self.length} length and {self.calcium} calcium samples, {self.late} of them late"
+        return self.told()
+
+    def told(self, topic: str = "length") -> str:
+        """In words; `topic` is ``length`` or ``load``."""
+        return f"{self.length} {topic} and {self.calcium} calcium samples, {self.late} of them late"
 
     @classmethod
     def read(cls, text: str) -> Account | None:
-        """Find an account in a text; the other way of `str`."""
-        found = re.search(r"(\d+) length and (\d+) calcium samples, (\d+) of them late", text)
+        """Find an account in a text; the other way of `told`."""
+        found = re.search(r"(\d+) (?:length|load) and (\d+) calcium samples, (\d+) of them late", text)
         return cls(*map(int, found.groups())) if found else None
 
 
-def time_went_back(last: int, stamp: int, account: Account) -> str:
-    """What to say when a length stamp (ns) goes back from the last one under simulated time."""
+def time_went_back(last: int, stamp: int, account: Account, topic: str = "length") -> str:
+    """What to say when a stamp (ns) of length or load goes back from the last one under simulated time."""
     return (
-        f"length went back from {last * 1e-9:.9f} s to {stamp * 1e-9:.9f} s of simulated time: state forgotten after "
-        f"{account}; the fibre settles anew"
+        f"{topic} went back from {last * 1e-9:.9f} s to {stamp * 1e-9:.9f} s of simulated time: state forgotten after "
+        f"{account.told(topic)}; the fibre settles anew"
     )
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -234,6 +234,10 @@ class Protocol(abc.ABC):
             held = np.full(corner_s.size, level)
             states = muscle.follow(state, corner_s, planned.corner_l0, held, trial.time_s)
         return run_of(trial, as_simulated(trial, trial.time_s, muscle.outputs_of(states)))
+
+    def answered(self, planned: Planned, simulated: Simulated, length_m: Array | None = None) -> Run:
+        """What something else answered to a planned trial, sample by sample; `length_m` to loads, shape (n,), m."""
+        return run_of(planned.trial if length_m is None else replace(planned.trial, length_m=length_m), simulated)
 
     def repeat(self, muscle: Muscle, trial: Trial, settle_s: float | None = None) -> Run:
         """What a model answers to what a recorded fibre was given: its length and calcium, unless a protocol differs.

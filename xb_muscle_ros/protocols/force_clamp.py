@@ -20,8 +20,9 @@ from xb_muscle_ros.scores.estimate import Estimate, Missing
 from xb_muscle_ros.scores.readout import isometric_force
 from xb_muscle_ros.simulation.offline import as_simulated, calcium_per_step
 from xb_muscle_ros.trials.protocol import ALLOWED, Allowed
+from xb_muscle_ros.trials.simulated import Simulated
 from xb_muscle_ros.trials.stamps import to_ns
-from xb_muscle_ros.trials.trial import Trial
+from xb_muscle_ros.trials.trial import Array, Trial
 
 CLAMP = "clamp"
 # Length that changes by less stays as it is, L0.
@@ -83,6 +84,11 @@ class ForceClamps(Protocol):
         phase = planned.trial.phases_by_name()[CLAMP]
         return _under_load(muscle, planned.trial, (phase.start_s, None), phase.start_s, load, settle_s)
 
+    def answered(self, planned: Planned, simulated: Simulated, length_m: Array | None = None) -> Run:
+        """The load in F0 is told beside its share."""
+        run = super().answered(planned, simulated, length_m)
+        return replace(run, trial=_with_load(run.trial, float(planned.load[-1] * run.force_f0[0])))
+
     def repeat(self, muscle: Muscle, trial: Trial, settle_s: float | None = None) -> Run:
         """The recorded length up to the clamp, then the recorded load, as a share of the recorded isometric force."""
         found = _window(Run(trial, trial.force_time_s, trial.measured_f0))
@@ -139,7 +145,8 @@ def _under_load(
     """
     start_s, end_s = between_s
     last = trial.time_s.size if end_s is None else int(np.searchsorted(trial.time_s, end_s + 5e-10, side="right"))
-    k = max(int(np.searchsorted(trial.time_s, start_s - 5e-10)), 1)
+    # The last sample before the load.
+    k = max(int(np.searchsorted(trial.time_s, start_s + 5e-10, side="right")) - 1, 0)
     calcium, dt_s = calcium_per_step(trial)[:last], np.diff(to_ns(trial.time_s[:last])) / 1e9
     length = trial.length_change_l0[:last]
     with naming(f"trial {trial.facts.trial}"):
@@ -154,21 +161,26 @@ def _under_load(
         except UserError as problem:
             raise NoAnswer(str(problem)) from problem
     states = np.concatenate([before[:-1], after])
-    facts = trial.facts
-    if facts.setting("load") is not None:
-        facts = replace(facts, settings=(*facts.settings, ("load_f0", level)))
+    trial = _with_load(trial, level)
     held = trial.calcium_time_s <= trial.time_s[last - 1]
     given = replace(
         trial,
-        facts=facts,
         time_s=trial.time_s[:last],
-        length_m=facts.reference_length_m * (1.0 + states[:, -3]),
+        length_m=trial.facts.reference_length_m * (1.0 + states[:, -3]),
         calcium_time_s=trial.calcium_time_s[held],
         calcium_um=trial.calcium_um[held],
         force_time_s=np.empty(0),
         force_n=np.empty(0),
     )
     return run_of(given, as_simulated(given, given.time_s, muscle.outputs_of(states)))
+
+
+def _with_load(trial: Trial, load_f0: float) -> Trial:
+    """A planned trial that tells its load in F0; a recording as it is."""
+    facts = trial.facts
+    if facts.setting("load") is None:
+        return trial
+    return replace(trial, facts=replace(facts, settings=(*facts.settings, ("load_f0", load_f0))))
 
 
 def _window(run: Run) -> ClampWindow | Missing:

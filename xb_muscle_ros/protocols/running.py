@@ -31,12 +31,15 @@ def answers(
     """
     muscle = Muscle(fibre)
     asked = (partial(protocol.answer, muscle, each, settle_s) for each in planned)
-    for run in _answered(asked, lacking):
+    for run in answered(asked, lacking):
         yield with_force(run, fibre, as_measured)
 
 
-def _answered(asked: Iterable[Callable[[], Run]], lacking: list[str] | None) -> Iterator[Run]:
-    """Answers that there are.
+def answered(asked: Iterable[Callable[[], Run]], lacking: list[str] | None) -> Iterator[Run]:
+    """Answers that there are, to questions asked one after the other.
+
+    Args:
+        lacking: see `answers`.
 
     Raises:
         NoAnswer: there is none at all, or none for one of them and no `lacking`.
@@ -91,7 +94,7 @@ def read_model(protocol: Protocol, fibre: Fibre, trials: Sequence[Trial], settle
     asked = (partial(protocol.repeat, muscle, trial, settle_s) for trial in trials)
     name = trials[0].facts.fibre
     try:
-        found = protocol.analyse(name, fibre.model, list(_answered(asked, lacking)))
+        found = protocol.analyse(name, fibre.model, list(answered(asked, lacking)))
     except NoAnswer:
         found = Found(name, fibre.model, ())
     return replace(found, notes=(*lacking, *found.notes))

@@ -1,7 +1,7 @@
 """Isotonic steps: the length for which a step ends at a given force. Compiled beside `kernels`, calling its `advance`.
 
-A step is a function of the length at its end; the load is a root of the force there. Of several roots the first one
-from the expected length on counts at which force rises with length: a force clamp is stable there alone.
+A step is a function of the length at its end; the load is a root of the force there. Of several roots that one counts
+which a fibre comes to first that bears too little and lengthens, or too much and shortens.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ outputs: Callable[[Array, Array, Array], None]
 
 # BEGIN COMPILED
 TOO_WEAK, TOO_STRONG, NOT_HELD = 4, 5, 6
+# The same as the first two, where not a limit but a length that no step reaches ends the search.
+WEAK_TO_END, STRONG_TO_END = 7, 8
 # Forces end within this of the load, F0, above it: of a spring that has gone slack the least stretched is the one that
 # has just not.
 HELD = 1e-9
@@ -30,6 +32,10 @@ HELD = 1e-9
 NEARLY_HELD = 1e-6
 # What a fibre's stiffness is like, F0/L0: where the second trial lies.
 LIKELY_STIFFNESS = 100.0
+# So far apart trials may be until the load lies between two, L0: force has a peak within a step, some 0.02 L0 wide,
+# and a slack part, and the load may be met beyond them again.
+STRIDE = 2e-3
+# Beside those strides.
 MOST_TRIALS = 500
 # How often the first step within is halved where force jumps over the load by more than that.
 MOST_HALVINGS = 6
@@ -41,8 +47,9 @@ def clamp(
 ) -> Any:  # fmt: skip
     """Carry a state over `dt` seconds to the length at which its force is the load, moving linearly to it.
 
-    The search starts where the last velocity leads to, goes on by secants, outwards until the load is bracketed, and
-    falls back on halving. Lengths that no step reaches bound it as the limits do.
+    The search starts where the last velocity leads to, or a stride from the length that the fibre has. It goes on by
+    secants, outwards by no more than a stride until the load is bracketed, and falls back on halving. Lengths that no
+    step reaches bound it as the limits do.
 
     Args:
         s: state vector, shape (n,).
@@ -57,13 +64,14 @@ def clamp(
         work: scratch, shape (14, n).
 
     Returns:
-        (code, index of the state at fault or -1, time reached in s or, where no length was found, the force in F0 of
-        that nearest to it, length of that one in L0, steps of the model tried, halvings of the step within)
+        (code, index of the state at fault or -1, time reached in s or, where no length was found, the force in F0
+        nearest to the load, length of that one in L0 or, where a failing step ended the search, of the last step that
+        did not, steps of the model tried, halvings of the step within)
     """
     n = s.shape[0]
     aim = load + 0.5 * HELD
     start = s[n - 3]
-    x = start + s[n - 2] * dt
+    x = start + min(max(s[n - 2] * dt, -STRIDE), STRIDE)
     if not shortest < x < longest:
         x = start
     # Ends of the search: lengths there give too little and too much force, once there are any.
@@ -85,7 +93,8 @@ def clamp(
     halvings = 0
     steps = 0
     settled = False
-    for _ in range(MOST_TRIALS):
+    ended = False
+    for _ in range(MOST_TRIALS + int((longest - shortest) / STRIDE)):
         code, fault, t, _, _, tried = advance(s, x, calcium, dt, p, h, tol, out, work)
         steps += tried
         g = math.nan
@@ -119,26 +128,28 @@ def clamp(
                 longest = x
             else:
                 shortest = x
+            ended = True
             x = 0.5 * (x + last)
             if abs(x - last) >= 1e-6:
                 continue
-            return (TOO_WEAK if excess < 0.0 else TOO_STRONG), -1, nearest + aim, nearest_at, steps, halvings
+            return (WEAK_TO_END if excess < 0.0 else STRONG_TO_END), -1, nearest + aim, last, steps, halvings
         slope = (excess - excess_before) / (last - before)
         if math.isinf(below) or math.isinf(above):
-            # Outwards by secants that may overshoot; where force does not rise with length, ever further.
+            # Outwards by secants that may overshoot; where force does not rise with length, by strides.
             reach = abs(last - before)
             if math.isnan(reach):
-                move = -excess / LIKELY_STIFFNESS
+                move = min(abs(excess) / LIKELY_STIFFNESS, STRIDE)
             elif slope > 0.0:
-                most = 8.0 * reach
-                move = min(max(-excess / slope, -most), most)
+                move = min(abs(excess) / slope, 8.0 * reach, STRIDE)
             else:
-                move = math.copysign(2.0 * reach, -excess)
+                move = STRIDE
             # By no less than what changes the length at all.
-            move = math.copysign(max(abs(move), 1e-15 * max(1.0, abs(last))), move)
+            move = math.copysign(max(move, 1e-15 * max(1.0, abs(last))), -excess)
             bound = longest if move > 0.0 else shortest
             room = math.copysign(1.0, move) * (bound - last)
             if room < 1e-6:
+                if ended:
+                    return (WEAK_TO_END if excess < 0.0 else STRONG_TO_END), -1, nearest + aim, last, steps, halvings
                 return (TOO_WEAK if excess < 0.0 else TOO_STRONG), -1, nearest + aim, nearest_at, steps, halvings
             x = last + move if abs(move) < room else 0.5 * (last + bound)
             continue

@@ -6,22 +6,25 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
 
 from xb_muscle_ros.errors import DataWarning, UserError
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.node.client.link import Link
+from xb_muscle_ros.node.client.travelling import Plan
 from xb_muscle_ros.node.client.wires import LoadSender, Sender, reliable
 from xb_muscle_ros.node.configuration import flat
+from xb_muscle_ros.node.diagnostics import fault_in, status_name
 from xb_muscle_ros.node.joint_state import Joints
 from xb_muscle_ros.node.traffic import subscribe
 from xb_muscle_ros.trials.simulated import MOMENTS, Simulated
-from xb_muscle_ros.trials.stamps import to_ns
 from xb_muscle_ros.trials.trial import Trial
 
 # Samples under way at once. Well below the depth of the queues, so that nothing is ever lost.
@@ -30,6 +33,12 @@ _HANDSHAKE_S = 1.0
 _FIND_S = 10.0
 _LOOK_EVERY_S = 0.2
 _LEAVE_S = 2.0
+# What the node tells of itself counts where it is so much younger than its last answer, s; it tells it once a second.
+_NEWER_S = 0.3
+
+
+class Stopped(UserError):
+    """The node's fibre stopped at a trial; after a reset it may play others."""
 
 
 def play_live(
@@ -61,48 +70,37 @@ def play_live(
     """
     if not trials:
         return []
-    with Link("muscle_player", namespace, domain_id) as link:
-        player = _met(link, trials, fibre, (timeout_s, find_s), "length")
+    with playing(trials, fibre, timeout_s, find_s, namespace, domain_id) as player:
         return [player.play(trial) for trial in trials]
 
 
-def play_loads(
+@contextmanager
+def playing(
     trials: Sequence[Trial],
-    shares: Sequence[npt.NDArray[np.float64]],
     fibre: Fibre | None = None,
     timeout_s: float = 10.0,
     find_s: float = _FIND_S,
     namespace: str = "",
     domain_id: int | None = None,
-) -> list[tuple[Simulated, npt.NDArray[np.float64]]]:
-    """Play trials of loads through the muscle node of a namespace, which is in lockstep and under force control.
+    topic: str = "length",
+) -> Iterator[Player]:
+    """A player for trials, which has met the node.
 
     Args:
-        trials: see `play_live`; their lengths are not sent.
-        shares: of each trial the load at every sample, shape (n,), over the isometric force with which the node
-            answers the first sample.
+        trials: one at least; those that will be played.
         fibre, timeout_s, find_s, namespace, domain_id: see `play_live`.
-
-    Returns:
-        One result per trial, in order, and the lengths (m) with which the node answered, shape (n,).
+        topic: what the node hears: ``length``, or ``load`` under force control.
 
     Raises:
         UserError: see `play_live`.
     """
-    if not trials:
-        return []
     with Link("muscle_player", namespace, domain_id) as link:
-        player = _met(link, trials, fibre, (timeout_s, find_s), "load")
-        found = []
-        for trial, share in zip(trials, shares, strict=True):
-            player.shares = share
-            found.append((player.play(trial), player.length_m))
-        return found
+        yield _met(link, trials, fibre, (timeout_s, find_s), topic)
 
 
 def _met(
     link: Link, trials: Sequence[Trial], fibre: Fibre | None, patience_s: tuple[float, float], topic: str
-) -> _Player:
+) -> Player:
     """A player and the node that it needs, which know each other."""
     timeout_s, find_s = patience_s
     name = trials[0].facts.fibre
@@ -110,7 +108,7 @@ def _met(
     given = str(fibre.path) if fibre is not None and fibre.path is not None else name
     control = " -p control:=force" if topic == "load" else ""
     command = f"muscle_node --ros-args -p fiber_file:={given}{model} -p mode:=lockstep{control}"
-    player = _Player(link, name, timeout_s, topic)
+    player = Player(link, name, timeout_s, topic)
     link.find(find_s, command)
     _check(link, trials, fibre, command, "force" if topic == "load" else "length")
     player.meet(find_s)
@@ -132,11 +130,10 @@ def _check(link: Link, trials: Sequence[Trial], fibre: Fibre | None, command: st
     link.check(wanted, command)
 
 
-class _Player:
+class Player:
     """Topics on one side, arrays on the other.
 
     Attributes:
-        shares: loads of the trial that is played next, over its isometric force, shape (n,); where loads are sent.
         length_m: lengths that were answered to the last trial, shape (n,), m; where loads are sent.
     """
 
@@ -144,7 +141,7 @@ class _Player:
         self._link = link
         self._timeout_s = timeout_s
         node = link.node
-        self.shares, self._loads = np.empty(0), topic == "load"
+        self._shares, self._loads = np.empty(0), topic == "load"
         self._calcium = Sender(node, "muscle/calcium", [fibre])
         self._driver = (LoadSender if self._loads else Sender)(node, f"muscle/{topic}", [fibre])
         self._inlets = [
@@ -153,6 +150,9 @@ class _Player:
         ]
         if self._loads:
             self._inlets.append(subscribe(node, "muscle/length", self._on_length, reliable()))
+        self._inlets.append(node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10))
+        # Why the node's fibre stopped, and when it said so (steady clock, s).
+        self._fault, self._fault_at_s = "", 0.0
         self._met = False
         self._begin({}, 0)
 
@@ -178,14 +178,25 @@ class _Player:
                 f"{' and '.join(topics)} have more publishers ({others()}); end them, or lockstep has two masters"
             )
 
-    def play(self, trial: Trial) -> Simulated:
+    def play(self, trial: Trial, shares: npt.NDArray[np.float64] | None = None) -> Simulated:
         """Play one trial.
 
         Calcium travels apart from length. Waiting until every calcium sample is acknowledged takes DDS seconds each, so
         the trial is played without, the node then tells whether all of it came in time, and only if not the trial is
         played again with waiting.
+
+        Args:
+            trial: of the node's fibre.
+            shares: under force control, where lengths of the trial are not sent: the load at every sample, over the
+                isometric force with which the node answers the first, shape (n,).
+
+        Raises:
+            Stopped: the node's fibre stopped; with its reason.
+            UserError: see `play_live`.
         """
-        plan = _Plan.of(trial)
+        if shares is not None:
+            self._shares = shares
+        plan = Plan.of(trial)
         facts = trial.facts
         self._check_alone()
         self._link.set_parameters(
@@ -217,7 +228,7 @@ class _Player:
             "sent; leave the machine more time, or end what else publishes calcium"
         )
 
-    def _play(self, trial: Trial, plan: _Plan, wait: bool) -> None:
+    def _play(self, trial: Trial, plan: Plan, wait: bool) -> None:
         stamps = plan.stamps
         self._begin({int(stamp): k for k, stamp in enumerate(stamps)}, stamps.size)
         if wait:
@@ -225,7 +236,7 @@ class _Player:
             self._wait_for_calcium(trial)
         self._start(trial, plan, wait)
         # A load is a share of the force with which the first sample was answered.
-        values = self._force[0, 0] * self.shares if self._loads else trial.length_m
+        values = self._force[0, 0] * self._shares if self._loads else trial.length_m
         for first in range(1, stamps.size, _WINDOW):
             window = range(first, min(first + _WINDOW, stamps.size))
             self._send_calcium(trial, plan, sorted({int(i) for i in plan.held[first : window.stop]}), wait)
@@ -233,7 +244,7 @@ class _Player:
                 self._driver.send(int(stamps[k]), values[k])
             self._await(window, trial, plan)
 
-    def _start(self, trial: Trial, plan: _Plan, wait: bool) -> None:
+    def _start(self, trial: Trial, plan: Plan, wait: bool) -> None:
         """Send the first sample, and again after a reset while the node's answers may not find their way yet."""
 
         def send() -> None:
@@ -256,7 +267,7 @@ class _Player:
         # How many were sent since the last reset, and the index of the newest of them.
         self._sent_calcium, self._newest_calcium = 0, -1
 
-    def _send_calcium(self, trial: Trial, plan: _Plan, needed: Sequence[int], wait: bool) -> None:
+    def _send_calcium(self, trial: Trial, plan: Plan, needed: Sequence[int], wait: bool) -> None:
         """Send calcium that was not sent yet, if wanted until the node has it."""
         new = [i for i in needed if i > self._newest_calcium]
         for i in new:
@@ -270,20 +281,23 @@ class _Player:
         if not self._calcium.publisher.wait_for_all_acked(Duration(seconds=self._timeout_s)):
             raise UserError(f"trial {trial.facts.trial}: node {self._link.peer} does not take calcium; is it running?")
 
-    def _await(self, window: range, trial: Trial, plan: _Plan) -> None:
+    def _await(self, window: range, trial: Trial, plan: Plan) -> None:
         missing = self._missing[window.start : window.stop]
-        end = time.monotonic() + self._timeout_s
+        answered_s = time.monotonic()
         before = int(missing.sum())
         while before:
             self._link.wait_for(lambda: not missing.any(), _LOOK_EVERY_S)
             now = int(missing.sum())
             if now < before:
-                end = time.monotonic() + self._timeout_s
-            elif time.monotonic() >= end:
+                answered_s = time.monotonic()
+            elif self._fault and self._fault_at_s > answered_s + _NEWER_S:
+                self._link.reset()
+                raise Stopped(f"trial {trial.facts.trial}: node {self._link.peer} stopped: {self._fault}")
+            elif time.monotonic() >= answered_s + self._timeout_s:
                 self._give_up(window.start + int(np.flatnonzero(missing)[0]), trial, plan)
             before = now
 
-    def _give_up(self, k: int, trial: Trial, plan: _Plan) -> None:
+    def _give_up(self, k: int, trial: Trial, plan: Plan) -> None:
         missing = int(self._missing[k])
         what = "force" if missing & 1 else "moments" if missing & 2 else "length"
         raise UserError(
@@ -309,37 +323,7 @@ class _Player:
             self.length_m[k] = message.position[0]
             self._missing[k] &= ~4
 
-
-class _Plan(NamedTuple):
-    """A trial as it travels: stamps in ns, and the index of the calcium that acts in the step to each sample."""
-
-    stamps: npt.NDArray[np.int64]
-    calcium_stamps: npt.NDArray[np.int64]
-    held: npt.NDArray[np.intp]
-
-    @classmethod
-    def of(cls, trial: Trial) -> _Plan:
-        """Plan of a trial.
-
-        Raises:
-            UserError: no samples, stamps that do not ascend, or no calcium at the first sample.
-        """
-        stamps = _stamps(trial.time_s, trial, "length")
-        calcium_stamps = _stamps(trial.calcium_time_s, trial, "calcium")
-        starts = np.concatenate([stamps[:1], stamps[:-1]])
-        held = np.searchsorted(calcium_stamps, starts, side="right") - 1
-        if stamps.size == 0 or held[0] < 0:
-            raise UserError(
-                f"trial {trial.facts.trial}: no calcium is known at its first length sample; "
-                "give the calcium that the fibre starts with"
-            )
-        return cls(stamps, calcium_stamps, held)
-
-
-def _stamps(time_s: npt.NDArray[np.float64], trial: Trial, what: str) -> npt.NDArray[np.int64]:
-    """Times as whole ns, as they travel."""
-    stamps: npt.NDArray[np.int64] = to_ns(time_s)
-    if np.any(np.diff(stamps) <= 0):
-        k = int(np.flatnonzero(np.diff(stamps) <= 0)[0]) + 1
-        raise UserError(f"trial {trial.facts.trial}: {what} stamps do not ascend at {time_s[k]:.9f} s; mend the trial")
-    return stamps
+    def _on_diagnostics(self, message: Any) -> None:
+        for status in message.status:
+            if status.name == status_name(self._link.peer):
+                self._fault, self._fault_at_s = fault_in(status), time.monotonic()
