@@ -121,6 +121,19 @@ def test_the_mappings_unit_goes_before_the_files(tmp_path: Path, save: Save) -> 
         save(tmp_path / "f.mat", content), columns={**COLUMNS, "force": {"column": "force", "unit": "uN"}}
     ).values()
     check(trial)
+    (line,) = (line for line in trial.warnings if "mapping's is used" in line)
+    assert "f.mat: the file says mN of force, the mapping uN" in line
+
+
+@pytest.mark.parametrize(("unit", "is_told"), [("mN", True), ("0.5 mN/mV", True), ("0.5 mN/V", False)])
+def test_volts_that_are_read_as_something_else_are_told(tmp_path: Path, save: Save, unit: str, is_told: bool) -> None:
+    """Regression: volts beside the numbers were passed over where the mapping gave newtons."""
+    content = {**scaled(1000.0), "force_unit": "V"}
+    columns = {**COLUMNS, "force": {"column": "force", "unit": unit}}
+    (trial,) = read(save(tmp_path / "f.mat", content), columns=columns, f0="10 N").values()
+    told = [line for line in trial.warnings if "the file says V of force" in line]
+    assert len(told) == is_told
+    assert all("give what one V stands for, for example '0.5 mN/V'" in line for line in told)
 
 
 @pytest.mark.parametrize("name", ["values", "data"])

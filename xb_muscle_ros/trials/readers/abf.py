@@ -15,8 +15,7 @@ from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal
 from xb_muscle_ros.trials.readers.contents import Content, Contents
 from xb_muscle_ros.trials.readers.description import ImportMapping, filled
 from xb_muscle_ros.trials.readers.left_out import Told
-from xb_muscle_ros.trials.readers.told_units import told_of, told_unit
-from xb_muscle_ros.trials.readers.units import UNITS, unit_in
+from xb_muscle_ros.trials.readers.told_units import differing, told_of, told_unit
 
 _TIME = "time"
 # Channels of these names are taken without being named.
@@ -103,7 +102,7 @@ def _recording(file: AbfFile, mapping: ImportMapping, sweep: int, name: str, whe
             number = file.index(column.name)
             values, shown = file.values(number, sweep), f"channel '{file.channels[number].name or number}'"
         signals[key] = Signal(shown, values, lambda i: f"sample {i + 1}")
-    lines = (*mapping.told, *_differing(file, mapping)) if sweep == 0 else ()
+    lines = (*mapping.told, *differing(str(file.path), _units(file, mapping), mapping)) if sweep == 0 else ()
     sweeps = (f"sweep {sweep + 1} of {len(file.sweeps)}",) if len(file.sweeps) > 1 else ()
     return Recording(
         where,
@@ -115,10 +114,6 @@ def _recording(file: AbfFile, mapping: ImportMapping, sweep: int, name: str, whe
     )
 
 
-def _differing(file: AbfFile, mapping: ImportMapping) -> Iterator[str]:
-    """Lines on units of the mapping that are others than the file's."""
-    for key, column in mapping.columns.items():
-        unit = "" if key == "time" else file.channels[file.index(column.name)].unit
-        known = unit_in(unit, key) if unit else None
-        if unit and unit != column.unit.per and (known is None or UNITS[known] != column.unit):
-            yield f"{file.path}: the file says {unit} of {key}, the mapping {column.unit_name}; the mapping's is used"
+def _units(file: AbfFile, mapping: ImportMapping) -> dict[str, str]:
+    """Units of the file by signal; of time there is none."""
+    return {key: file.channels[file.index(each.name)].unit for key, each in mapping.columns.items() if key != "time"}

@@ -26,7 +26,7 @@ from xb_muscle_ros.trials.readers.mat_file import MAT5, MAT73, load, names_of
 from xb_muscle_ros.trials.readers.mat_nodes import Struct, listed
 from xb_muscle_ros.trials.readers.mat_path import MatPath
 from xb_muscle_ros.trials.readers.mat_units import UNIT_NAMES, unit_beside
-from xb_muscle_ros.trials.readers.told_units import told_of, told_unit
+from xb_muscle_ros.trials.readers.told_units import differing, told_of, told_unit
 from xb_muscle_ros.trials.trial import Array
 
 _ROOT = re.compile(r"\s*\w*")
@@ -88,7 +88,8 @@ class MatReader(Reader):
         empty = [i for i in range(count or 0) if _is_empty(paths, content, i, str(path))]
         numbers = ", ".join(str(i + 1) for i in empty)
         notices = (f"{path}: trials without a length or force were not measured and are left out: {numbers}",)
-        first = (*mapping.told, *(notices if empty else ()))
+        units = {key: unit_beside(content, each) or "" for key, each in paths.items() if key != "trial"}
+        first = (*mapping.told, *differing(str(path), units, mapping), *(notices if empty else ()))
         for i, name in enumerate(names):
             if i not in empty:
                 where = str(path) if count is None else f"{path}, trial {name}"

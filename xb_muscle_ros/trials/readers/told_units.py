@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.readers.left_out import Told
-from xb_muscle_ros.trials.readers.units import KINDS, unit_in, unit_of
+from xb_muscle_ros.trials.readers.units import KINDS, UNITS, calibration, unit_in, unit_of, volts_of
 
 
 def told_unit(text: str, signal: str, where: str) -> str:
@@ -26,6 +29,26 @@ def told_unit(text: str, signal: str, where: str) -> str:
     except UserError as problem:
         raise UserError(f"{problem} (the file says so); give {option} if it is another") from None
     return text
+
+
+def differing(where: str, units: Mapping[str, str], mapping: ImportMapping) -> Iterator[str]:
+    """Lines on units of a mapping that are others than the file's.
+
+    Args:
+        where: the file.
+        units: as the file has them, by signal; empty for none.
+    """
+    for key, unit in units.items():
+        column = mapping.columns[key]
+        known = unit_in(unit, key) if unit else None
+        volts = volts_of(unit, key) if unit else ""
+        if volts and volts != column.unit.per:
+            yield (
+                f"{where}: the file says {unit} of {key}, the mapping {column.unit_name}; the mapping's is used; by "
+                f"columns.{key}.unit (--{key}-unit) give {calibration(key, volts)}"
+            )
+        elif unit and not volts and (known is None or UNITS[known] != column.unit):
+            yield f"{where}: the file says {unit} of {key}, the mapping {column.unit_name}; the mapping's is used"
 
 
 def told_of(where: str, columns: dict[str, str], units: dict[str, str]) -> Told:
