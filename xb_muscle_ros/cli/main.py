@@ -18,6 +18,7 @@ COMMANDS = {
     "inspect": "say what is in a file, and which mapping would import it",
     "import": "make bags of recordings: tables, Excel, MATLAB, Aurora, Axon, SLControl, OpenSim, other bags",
     "record": "record live topics into a bag",
+    "play": "send trials in real time, to a node or an apparatus",
     "simulate": "simulate trials of a protocol into bags, and read them off",
     "export": "write trials of bags as CSV, Parquet or OpenSim tables",
     "replay": "replay bags through the model and compare forces",

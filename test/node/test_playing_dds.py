@@ -1,0 +1,201 @@
+"""Trials by the clock: every sample at its time, to a node in realtime, and what goes wrong is said."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+
+import xb_muscle_ros as xb
+from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.node.client.link import Link
+from xb_muscle_ros.node.client.process import NodeProcess, child_environment
+from xb_muscle_ros.node.client.wires import reliable
+from xb_muscle_ros.node.joint_state import Joints
+from xb_muscle_ros.node.playing import Sent, _schedule, play
+from xb_muscle_ros.node.traffic import subscribe
+from xb_muscle_ros.trials.trial import Trial, TrialFacts
+
+FIBRE = "18Dec2017a"
+
+
+def trial_of(**changes: Any) -> Trial:
+    time_s = 5.0 + np.arange(200) * 2e-3
+    given = {
+        "time_s": time_s,
+        "length_m": 0.03 * (1.0 + 0.01 * np.sin(20.0 * time_s)),
+        "calcium_time_s": np.array([4.0, 5.0, 5.1, 5.2001]),
+        "calcium_um": np.array([0.1, 1.0, 2.0, 3.0]),
+        "force_time_s": time_s[::2],
+        "force_n": np.linspace(1.0, 2.0, 100),
+    }
+    return Trial(TrialFacts(FIBRE, "wavy", reference_length_m=0.03, f0_n=2.0), **{**given, **changes})
+
+
+class Audience:
+    """Hears what is played, from a thread."""
+
+    def __init__(self, domain: int, *topics: str) -> None:
+        self.heard: dict[str, list[Joints]] = {topic: [] for topic in topics}
+        self._link = Link("audience", domain_id=domain)
+        self._kept = [
+            subscribe(self._link.node, f"muscle/{topic}", self.heard[topic].append, reliable()) for topic in topics
+        ]
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._listen)
+
+    def _listen(self) -> None:
+        while not self._end.is_set():
+            self._link.wait_for(lambda: False, 0.05)
+
+    def __enter__(self) -> Audience:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._end.set()
+        self._thread.join(10.0)
+        self._link.close()
+
+
+def test_calcium_goes_before_the_length_of_its_time_and_what_is_outside_is_left_out() -> None:
+    sent = Sent.of(trial_of(), "length")
+    due, is_calcium, at = _schedule(sent, 2.0)
+    assert np.all(np.diff(due) >= 0)
+    assert due[-1] == pytest.approx(0.398e9 / 2.0)
+    # That of 5.0 s is held from the rest on.
+    assert at[is_calcium].tolist() == [2, 3]
+    k = int(np.flatnonzero(is_calcium)[0])
+    assert due[k] == due[k + 1] == 50_000_000
+    assert at[~is_calcium].tolist() == list(range(200))
+
+
+def test_what_is_sent_for_one_l0_and_one_f0() -> None:
+    trial = trial_of()
+    assert Sent.of(trial, "length").value.tolist() == trial.length_m.tolist()
+    assert Sent.of(trial, "length", unit=0.06).value == pytest.approx(2.0 * trial.length_m)
+    load = Sent.of(trial, "load", "other", 1.0)
+    assert load.joint == "other"
+    assert load.value == pytest.approx(0.5 * trial.force_n)
+    assert load.time_s.tolist() == trial.force_time_s.tolist()
+    with pytest.raises(UserError, match="trial wavy has 0 samples of force to send as load"):
+        Sent.of(trial_of(force_time_s=np.empty(0), force_n=np.empty(0)), "load")
+    with pytest.raises(UserError, match=r"trial wavy: samples of length do not ascend at 5.000000000 s"):
+        Sent.of(trial_of(time_s=np.full(200, 5.0)), "length")
+
+
+def test_every_sample_comes_with_its_time(new_domain: Callable[[], int]) -> None:
+    domain, trial = new_domain(), trial_of()
+    said: list[str] = []
+    with Audience(domain, "length", "calcium") as audience:
+        time.sleep(0.5)
+        begun = time.monotonic()
+        (played,) = play(
+            [Sent.of(trial, "length")], rest_s=0.3, wait_s=30.0, say=said.append, speed=0.5, domain_id=domain
+        )
+        took = time.monotonic() - begun
+        time.sleep(0.3)
+    assert (played.sent, played.whole, played.answered_by) == (200, True, frozenset())
+    # It is no faster than asked; how much slower is the machine's affair.
+    assert took > 0.3 + 0.398 / 0.5
+    assert said[-1] == f"plays wavy as {FIBRE} on /muscle/length: 0.796 s"
+    lengths = audience.heard["length"][-200:]
+    assert [message.names for message in lengths] == [(FIBRE,)] * 200
+    assert [float(message.position[0]) for message in lengths] == trial.length_m.tolist()
+    stamps = np.array([message.stamp_ns for message in lengths])
+    assert np.abs(np.diff(stamps) - 4_000_000).max() <= 1
+    slopes = np.diff(trial.length_m) / 2e-3 * 0.5
+    assert [float(message.velocity[0]) for message in lengths[:-1]] == pytest.approx(slopes.tolist())
+    calcium = [(float(each.position[0]), each.stamp_ns - stamps[0]) for each in audience.heard["calcium"]]
+    assert {value for value, at in calcium if at <= 0} == {1.0}
+    assert [(value, round(at * 1e-9, 4)) for value, at in calcium if at > 0] == [(2.0, 0.2), (3.0, 0.4002)]
+    # Held before, and never earlier again.
+    held = [message for message in audience.heard["length"] if message.stamp_ns < stamps[0]]
+    assert len(held) > 5
+    assert {float(message.position[0]) for message in held} == {float(trial.length_m[0])}
+    assert np.all(np.diff([message.stamp_ns for message in audience.heard["length"]]) > 0)
+
+
+@pytest.mark.slow
+def test_a_node_in_realtime_answers_as_the_model_does(new_domain: Callable[[], int], tmp_path: Path) -> None:
+    """The command over real DDS: the isometric force, then that of a stretch; and a wrong name is said."""
+    domain = new_domain()
+    options = {"pca": 4.5, "hold": 0.3}
+    (found,) = xb.run_protocol("ramp-hold", FIBRE, tell=lambda line: None, **options).results
+    (run,) = found.runs
+    (bag,) = xb.write_trials([run.trial], tmp_path)
+    command = [sys.executable, "-m", "xb_muscle_ros.cli.main", "play", str(bag), "--rest", "1", "--wait", "60"]
+    parameters = {"fiber_file": FIBRE, "mode": "realtime", "rate_hz": 500.0, "extrapolate": True, "max_catch_up": 100}
+    with NodeProcess(domain, parameters) as node, Audience(domain, "force") as audience:
+        done = subprocess.run(
+            [*command, "--as-l0", "1 m"], env=child_environment(domain), capture_output=True, text=True, timeout=120.0
+        )
+        assert done.returncode == 0, done.stderr + node.log()
+        forces = np.array([float(message.effort[0]) for message in audience.heard["force"]])
+        assert "force was heard" not in done.stderr
+        other = subprocess.run(
+            [*command, "--fiber", "stranger"], env=child_environment(domain), capture_output=True, text=True,
+            timeout=120.0,
+        )  # fmt: skip
+    assert f"plays {run.trial.facts.trial} as {FIBRE} on /muscle/length" in done.stdout
+    assert f"{run.time_s.size} samples, late by " in done.stdout
+    assert forces[0] == pytest.approx(run.force_f0[0], rel=1e-3)
+    # A late sample smears the stretch or makes a step of it; that it is there a busy machine leaves.
+    assert forces.max() > 0.5 * (run.force_f0[0] + run.force_f0.max())
+    assert f"force was heard of {FIBRE} alone" in other.stderr
+    assert "knows fibre stranger" in other.stderr
+
+
+def test_nobody_listens(new_domain: Callable[[], int]) -> None:
+    with pytest.raises(UserError, match=r"nobody listens to /muscle/length \(looked for 0.2 s\)"):
+        list(play([Sent.of(trial_of(), "length")], wait_s=0.2, domain_id=new_domain()))
+
+
+def test_ctrl_c_ends_a_trial_between_samples(new_domain: Callable[[], int], tmp_path: Path) -> None:
+    domain = new_domain()
+    long = trial_of(time_s=5.0 + np.arange(200) * 0.1, force_time_s=np.empty(0), force_n=np.empty(0))
+    (bag,) = xb.write_trials([long], tmp_path)
+    command = [sys.executable, "-m", "xb_muscle_ros.cli.main", "play", str(bag), "--rest", "0", "--wait", "60"]
+    with Audience(domain, "length", "calcium") as audience:
+        player = subprocess.Popen(
+            command, env=child_environment(domain), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        try:
+            end = time.monotonic() + 60.0
+            while len(audience.heard["length"]) < 5 and time.monotonic() < end:
+                time.sleep(0.05)
+            player.send_signal(signal.SIGINT)
+            out, err = player.communicate(timeout=20.0)
+        finally:
+            player.kill()
+    assert player.returncode == 130
+    assert "wavy: " in out
+    assert "Traceback" not in err
+    assert "stopped after 0 of 1 trials" in err
+
+
+def test_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from xb_muscle_ros.cli.main import main
+
+    (bag,) = xb.write_trials([trial_of(force_time_s=np.empty(0), force_n=np.empty(0))], tmp_path)
+    for arguments, said in (
+        (["--speed", "0"], "--speed is 0; allowed is above 0"),
+        (["--rest", "-1"], "--rest is -1; allowed is from 0"),
+        (["--as-f0", "20 N"], "--as-f0 is of no use with --drive length"),
+        (["--drive", "load", "--as-l0", "3 mm"], "--as-l0 is of no use with --drive load"),
+        (["--as-l0", "20 N"], "'N' is no unit of length"),
+        (["--as-l0", "2 L0"], "--as-l0 is '2 L0'; needed is a length"),
+        (["--drive", "load"], "trial wavy has 0 samples of force to send as load"),
+    ):
+        assert main(["play", str(bag), *arguments]) == 2
+        assert said in capsys.readouterr().err
