@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from test_contract import CASES, fibre_for
 
 from xb_muscle_ros.errors import StateViolation, UserError
-from xb_muscle_ros.models.clamping import clamp, clamp_run
+from xb_muscle_ros.models.batch import MuscleBatch
+from xb_muscle_ros.models.clamping import clamp, clamp_run, is_load_refused
 from xb_muscle_ros.models.fibre_file import load_fibre
 from xb_muscle_ros.models.muscle import Muscle
 
@@ -276,6 +277,33 @@ def test_a_fibre_does_not_jump_to_where_its_passive_element_bears_the_load() -> 
     assert clamp(muscle, released, 0.8 * isometric, 30.0, 1e-3)[-3] == pytest.approx(-0.0067, abs=1e-3)
 
 
+@pytest.mark.parametrize("model", ["3state_coop", "3state_coop_slack+passive_force_length", "2state_coop"])
+def test_past_the_peak_the_way_is_that_of_the_force_at_the_own_length(model: str) -> None:
+    """Regression: where force falls with length the first trial, a stride on, sent the search to the passive branch."""
+    muscle = Muscle(fibre_for(model, "gaussian", 0.0))
+    start = muscle.settle(0.0, 30.0)
+    forces = [muscle.outputs(muscle.step(start, x, 30.0, 1e-3)).force_f0 for x in np.arange(0.0, 0.3, 1e-3)]
+    state = clamp(muscle, start, 0.999 * max(forces), 30.0, 1e-3)
+    own, on = (muscle.outputs(muscle.step(state, state[-3] + by, 30.0, 1e-3)).force_f0 for by in (0.0, 2e-3))
+    assert on < own
+    assert state[-2] > 2.0
+    for share in (0.1, 0.5, 0.9):
+        load = own + share * (on - own)
+        shorter, longer = first_crossing(muscle, state, load, 30.0, 1e-3)
+        assert longer < state[-3]
+        assert shorter - 1e-9 <= clamp(muscle, state, load, 30.0, 1e-3)[-3] <= longer + 1e-9
+
+
+def test_a_length_beyond_the_limits_is_no_begin() -> None:
+    muscle = muscle_of()
+    state = muscle.step(muscle.settle(0.0, 1.0), 0.6, 1.0, 1.0)
+    with pytest.raises(UserError, match=r"its length change is 0.6 L0, beyond the limits -0.5 to 0.5"):
+        clamp(muscle, state, 0.55, 1.0, 1e-3)
+    with pytest.raises(UserError, match="beyond the limits"):
+        clamp_run(muscle, state, np.full(1, 1e-3), np.full(2, 0.5), np.ones(2))
+    assert clamp(muscle, state, 0.55, 1.0, 1e-3, limits_l0=(-0.5, 1.0))[-3] < 1.0
+
+
 def test_the_most_that_is_borne_is_told() -> None:
     """A load just below force's peak within a step is held, and one above it is refused with the peak."""
     muscle = muscle_of()
@@ -286,6 +314,10 @@ def test_the_most_that_is_borne_is_told() -> None:
     with pytest.raises(UserError, match="the most is ") as error:
         clamp(muscle, start, 10.0, 30.0, 1e-3)
     assert float(str(error.value).split("the most is ")[1].split(" F0")[0]) == pytest.approx(peak, rel=2e-3)
+    with pytest.raises(UserError, match=r"load of 1e\+300 F0 is more .*: the most is [1-9]"):
+        clamp(muscle, start, 1e300, 30.0, 1e-3)
+    assert is_load_refused(str(error.value))
+    assert not is_load_refused("fibre f: state drx became 3 at t = 0 s")
 
 
 def test_a_state_at_fault_is_named_as_by_a_step() -> None:
@@ -339,12 +371,26 @@ def test_what_is_no_state_of_the_fibre_is_refused() -> None:
         lambda state: muscle.run(state, dt, 0.0 * ones, ones),
         lambda state: muscle.follow(state, np.arange(4.0), 0.0 * ones, ones, np.arange(4.0)),
         muscle.outputs,
+        lambda state: muscle.hold(state, 1.0, 1e-3),
     ]
     for call in calls:
         call(start)
         for wrong in (start[:-1], start.astype(int), start[None], [0.0]):
             with pytest.raises(UserError, match=r"model 3state_coop: a state is float64 of shape \(\d+,\), not"):
                 call(wrong)
+
+
+def test_what_are_no_states_of_the_fibres_is_refused() -> None:
+    batch = MuscleBatch([load_fibre(FIBRE), load_fibre(FIBRE)])
+    states = batch.settle(np.zeros(2), np.ones(2))
+    batch.step(states, np.zeros(2), np.ones(2), 1e-3)
+    muscle = batch.muscles[0]
+    for wrong in (states[:, :-1], states.astype(int), states.astype(np.float32)):
+        for call in (lambda given: batch.step(given, np.zeros(2), np.ones(2), 1e-3), batch.outputs, muscle.outputs_of):
+            with pytest.raises(UserError, match=r"states of 2 fibres have shape \(2, \d+\) of (float|int)"):
+                call(wrong)
+    with pytest.raises(UserError, match="states of 2 fibres"):
+        batch.outputs(states[:1])
 
 
 @settings(max_examples=200)

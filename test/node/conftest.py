@@ -106,8 +106,9 @@ def start(domain: int, request: pytest.FixtureRequest) -> Iterator[Callable[...,
         # All end side by side.
         driver.process.ask_to_stop()
     for driver in drivers:
-        driver.link.close()
         driver.process.stop()
+    for driver in drivers:
+        driver.link.close()
 
 
 @pytest.fixture(scope="module")

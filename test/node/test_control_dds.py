@@ -125,6 +125,28 @@ def test_a_load_that_is_not_borne_leaves_the_others(
         assert one.setting("load_f0") == pytest.approx(other.setting("load_f0"), abs=1e-8)
 
 
+def test_a_stop_for_another_reason_ends_the_protocol(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As offline: a state out of its bounds is no load that is not borne."""
+    from collections.abc import Iterator
+    from contextlib import contextmanager
+
+    import xb_muscle_ros as xb
+    from xb_muscle_ros.node.client import player
+
+    class Ill:
+        def play(self, trial: Any, shares: Any = None) -> Any:
+            raise player.Stopped(f"trial {trial.facts.trial}: node /n stopped: fibre f: state drx became 3")
+
+    @contextmanager
+    def playing(*_: Any, **__: Any) -> Iterator[Any]:
+        yield Ill()
+
+    monkeypatch.setattr(player, "playing", playing)
+    for protocol in ("force-clamp", "twitch"):
+        with pytest.raises(xb.UserError, match="state drx became 3"):
+            xb.run_protocol(protocol, FIBRE, live=True, tell=lambda line: None)
+
+
 def test_the_other_control_is_one_line(new_domain: Callable[[], int], monkeypatch: pytest.MonkeyPatch) -> None:
     import xb_muscle_ros as xb
     from xb_muscle_ros.node.client.process import NodeProcess

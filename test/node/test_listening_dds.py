@@ -61,8 +61,8 @@ def before(domain: int, request: pytest.FixtureRequest) -> Iterator[Callable[...
 
     yield make
     for driver in made:
-        driver.link.close()
         driver.process.stop()
+        driver.link.close()
 
 
 @pytest.mark.slow

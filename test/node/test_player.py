@@ -196,8 +196,33 @@ def test_who_listens_too_late_is_told_of(node: Any, monkeypatch: pytest.MonkeyPa
             wait(player, window, *rest)
 
         monkeypatch.setattr(Player, "_await", wait_with_company)
-        with pytest.warns(DataWarning, match=r"trial short: 1 more subscription of .*/muscle/length came while"):
+        with pytest.warns(
+            DataWarning,
+            match=r"trial short: more subscriptions came while .* \(1 of .*/muscle/length\); start recorders",
+        ):
             play_live([TRIAL], namespace=node.namespace, domain_id=node.domain)
+
+
+def test_a_stop_at_the_first_sample_has_its_reason(node: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Regression: only what came after the first sample was told of; and the next trial is not held to blame for it."""
+    from xb_muscle_ros.node.client.player import Player, Stopped, playing
+
+    where = {"namespace": node.namespace, "domain_id": node.domain}
+    with playing([TRIAL], **where) as player:
+        player.play(TRIAL)
+        begin = player._link.begin
+
+        def stop_instead(send: Any, answered: Any, timeout_s: float, patience_s: float) -> bool:
+            player._fault, player._fault_at_s = "fibre f: no rest", float("inf")
+            return begin(lambda: None, answered, timeout_s, patience_s)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(player._link, "begin", stop_instead)
+            patch.setattr(Player, "_on_diagnostics", lambda *_: None)
+            with pytest.raises(Stopped, match=r"trial short: node .* stopped: fibre f: no rest"):
+                player.play(TRIAL)
+        player._fault_at_s = 0.0
+        player.play(TRIAL)
 
 
 @pytest.mark.slow

@@ -51,6 +51,7 @@ class Audience:
         self._kept = [
             subscribe(self._link.node, f"muscle/{topic}", self.heard[topic].append, reliable()) for topic in topics
         ]
+        self.publishers = self._link.node.count_publishers
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._listen)
 
@@ -134,11 +135,18 @@ def test_a_node_in_realtime_answers_as_the_model_does(new_domain: Callable[[], i
     (found,) = xb.run_protocol("ramp-hold", FIBRE, tell=lambda line: None, **options).results
     (run,) = found.runs
     (bag,) = xb.write_trials([run.trial], tmp_path)
-    command = [sys.executable, "-m", "xb_muscle_ros.cli.main", "play", str(bag), "--rest", "1", "--wait", "60"]
+    command = [sys.executable, "-m", "xb_muscle_ros.cli.main", "play", str(bag), "--wait", "60"]
     parameters = {"fiber_file": FIBRE, "mode": "realtime", "rate_hz": 500.0, "extrapolate": True, "max_catch_up": 100}
     with NodeProcess(domain, parameters) as node, Audience(domain, "force") as audience:
+        end = time.monotonic() + 60.0
+        while not audience.publishers("muscle/force") and time.monotonic() < end:
+            time.sleep(0.1)
         done = subprocess.run(
-            [*command, "--as-l0", "1 m"], env=child_environment(domain), capture_output=True, text=True, timeout=120.0
+            [*command, "--as-l0", "1 m", "--rest", "4"],
+            env=child_environment(domain),
+            capture_output=True,
+            text=True,
+            timeout=120.0,
         )
         assert done.returncode == 0, done.stderr + node.log()
         forces = np.array([float(message.effort[0]) for message in audience.heard["force"]])

@@ -24,6 +24,7 @@ import xb_muscle_ros as xb  # noqa: E402
 from xb_muscle_ros.errors import UserError  # noqa: E402
 from xb_muscle_ros.node.client.player import Player  # noqa: E402
 from xb_muscle_ros.node.client.process import child_environment  # noqa: E402
+from xb_muscle_ros.node.program import take_in_news  # noqa: E402
 from xb_muscle_ros.node.recording import record  # noqa: E402
 
 FACTS = {
@@ -77,6 +78,7 @@ class Laboratory:
     def __exit__(self, *_: object) -> None:
         self._end.set()
         self._thread.join(10.0)
+        take_in_news()
         self.node.destroy_node()
         self.context.try_shutdown()
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.models.clamping import is_load_refused
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.protocols import running
 from xb_muscle_ros.protocols.base import NoAnswer, Planned, Protocol, Run
@@ -43,7 +44,9 @@ def answers(
         try:
             simulated = player.play(each.trial, each.load if by_load else None)
         except Stopped as problem:
-            raise NoAnswer(str(problem)) from problem
+            if by_load and is_load_refused(str(problem)):
+                raise NoAnswer(str(problem)) from problem
+            raise
         return protocol.answered(each, simulated, player.length_m if by_load else None)
 
     topic = "load" if planned[0].load.size else "length"

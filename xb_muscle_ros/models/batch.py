@@ -10,7 +10,7 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.models.inputs import check_many
+from xb_muscle_ros.models.inputs import check_many, check_states
 from xb_muscle_ros.models.muscle import GUARD, SCRATCH_ROWS, Array, Muscle, Outputs
 
 _NO_TABLE = np.empty((0, len(Outputs._fields)))
@@ -164,7 +164,12 @@ class MuscleBatch:
         return {name: table[:, i].copy() for i, name in enumerate(Outputs._fields)}
 
     def output_table(self, states: Array) -> Array:
-        """Outputs, shape (fibres, 11), a column for each name of `Outputs`."""
+        """Outputs, shape (fibres, 11), a column for each name of `Outputs`.
+
+        Raises:
+            UserError: no states of these fibres.
+        """
+        check_states(states, len(self), self._work.shape[2])
         table = np.empty((len(self.muscles), len(Outputs._fields)))
         self._code.outputs_many(states, self._p, table)
         return table

@@ -18,6 +18,8 @@ from xb_muscle_ros.models.muscle import GUARD, Array, Muscle, Outputs
 LIMITS_L0 = (-0.5, 0.5)
 """Length changes between which a load is borne, L0: half a fibre length either way, past which none does its work."""
 
+# Begins what is said of a load.
+_LOAD = "load of "
 # Result codes of `stepping.clamp_kernels`; those below are of any step.
 _TOO_WEAK, _TOO_STRONG, _NOT_HELD, _WEAK_TO_END, _STRONG_TO_END = 4, 5, 6, 7, 8
 
@@ -58,7 +60,7 @@ def clamp(
     check(name, 0.0, calcium_um, dt_s)
     check_load(name, load_f0)
     muscle.check_state(state)
-    check_limits(name, *limits_l0)
+    check_limits(name, *limits_l0, float(state[-3]))
     out = np.empty_like(state)
     code, fault, value, length, _, _ = muscle.code.clamp(
         state, float(load_f0), float(calcium_um), float(dt_s), *map(float, limits_l0), muscle.parameters, GUARD, out,
@@ -67,7 +69,7 @@ def clamp(
     if code != 0:
         if code < _TOO_WEAK:
             muscle.complain(code, fault, value, out)
-        _complain(f"fibre {name}: load of {load_f0:.6g} F0", code, value, length, limits_l0)
+        _complain(f"fibre {name}: {_LOAD}{load_f0:.6g} F0", code, value, length, limits_l0)
     return out
 
 
@@ -100,8 +102,8 @@ def clamp_run(
     name = muscle.fibre.name
     dt, load, calcium = (np.ascontiguousarray(a, dtype=np.float64) for a in (dt_s, load_f0, calcium_um))
     check_loads(name, dt, load, calcium)
-    check_limits(name, *limits_l0)
     muscle.check_state(state, every)
+    check_limits(name, *limits_l0, float(state[-3]))
     states = np.zeros(((load.size - 1) // every + 1, state.size))
     code, fault, value, length, steps, halvings, k = muscle.code.clamp_run(
         state, dt, load, calcium, *map(float, limits_l0), muscle.parameters, GUARD, every, states, _shown(), muscle.work
@@ -109,11 +111,16 @@ def clamp_run(
     if code != 0:
         if code < _TOO_WEAK:
             muscle.complain(code, fault, float(dt[: k - 1].sum()) + value, states[-1])
-        at = f"fibre {name}: load of {load[k]:.6g} F0 at t = {dt[:k].sum():.6g} s"
+        at = f"fibre {name}: {_LOAD}{load[k]:.6g} F0 at t = {dt[:k].sum():.6g} s"
         _complain(at, code, value, length, limits_l0)
     if counts is not None:
         counts += [steps, halvings]
     return states
+
+
+def is_load_refused(text: str) -> bool:
+    """Whether a message, perhaps of another process, says that a load is not borne; others are of states and inputs."""
+    return _LOAD in text
 
 
 def _shown() -> Array:
@@ -139,7 +146,7 @@ def _complain(load: str, code: int, force_f0: float, length_l0: float, limits_l0
         to, where = (f"{longest:g} L0", f", at {length_l0:.4g} L0") if code == _TOO_WEAK else (end, "")
         raise UserError(
             f"{load} is more than the fibre bears at any length change from its own up to {to}: the most is "
-            f"{force_f0:.4g} F0{where}; give a smaller load, more calcium or a shorter step"
+            f"{force_f0:.4g} F0{where}; give a smaller load, more calcium or less time between samples"
         )
     if code in (_TOO_STRONG, _STRONG_TO_END):
         to, where = (f"{shortest:g} L0", f", at {length_l0:.4g} L0") if code == _TOO_STRONG else (end, "")
@@ -149,5 +156,5 @@ def _complain(load: str, code: int, force_f0: float, length_l0: float, limits_l0
         )
     raise UserError(
         f"{load} lies where force jumps: the nearest is {force_f0:.9g} F0, at a length change of {length_l0:.6g} L0; "
-        "take a smaller step"
+        "take less time between samples"
     )

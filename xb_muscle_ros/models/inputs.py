@@ -59,8 +59,7 @@ def check_many(
         UserError: out of range, not a number, or of another shape; names the first fibre at fault.
     """
     count = len(fibres)
-    if states.shape != (count, columns):
-        raise UserError(f"states of {count} fibres have shape {states.shape}; needed is ({count}, {columns})")
+    check_states(states, count, columns)
     for name, values in (("length changes", length_change_l0), ("calcium", calcium_um)):
         if values.shape != (count,):
             raise UserError(f"{name} of {count} fibres has shape {values.shape}; needed is ({count},)")
@@ -71,6 +70,24 @@ def check_many(
         return
     k = max(int(k), 0)
     _refuse(f"fibre {fibres[k]}", float(length_change_l0[k]), float(calcium_um[k]), dt_s)
+
+
+def check_states(states: Array, count: int, columns: int) -> None:
+    """See whether compiled loops may be given states, which they take as they are.
+
+    Args:
+        states: shape (fibres, columns).
+        count: fibres.
+        columns: entries of a state.
+
+    Raises:
+        UserError: they have another shape, or are not 64-bit numbers.
+    """
+    if states.shape != (count, columns) or states.dtype != np.float64:
+        raise UserError(
+            f"states of {count} fibres have shape {states.shape} of {states.dtype}; needed is ({count}, {columns}) of "
+            "float64"
+        )
 
 
 def check_samples(fibre: str, dt_s: Array, length_change_l0: Array, calcium_um: Array, first: int = 0) -> None:
@@ -130,16 +147,21 @@ def check_load(fibre: str, load_f0: float) -> None:
         raise UserError(f"fibre {fibre}: load is {load_f0:g} F0; allowed is any number; give the force to hold, F0")
 
 
-def check_limits(fibre: str, shortest_l0: float, longest_l0: float) -> None:
-    """Check the limits between which a length is looked for.
+def check_limits(fibre: str, shortest_l0: float, longest_l0: float, now_l0: float) -> None:
+    """Check the limits between which a length is looked for, from the one that the fibre has now on.
 
     Raises:
-        UserError: not in order, or beyond what a step takes.
+        UserError: not in order, or beyond what a step takes, or the length now is beyond them.
     """
     if not SHORTEST_L0 <= shortest_l0 < longest_l0 <= LONGEST_L0:
         raise UserError(
             f"fibre {fibre}: limits of the length change are {shortest_l0:g} and {longest_l0:g} L0; allowed are two "
             f"between {SHORTEST_L0:g} and {LONGEST_L0:g}, the shorter first"
+        )
+    if not shortest_l0 <= now_l0 <= longest_l0:
+        raise UserError(
+            f"fibre {fibre}: its length change is {now_l0:.6g} L0, beyond the limits {shortest_l0:g} to {longest_l0:g} "
+            "between which loads are borne; begin from a length within them"
         )
 
 

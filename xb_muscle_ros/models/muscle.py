@@ -13,18 +13,18 @@ from xb_muscle_ros.errors import StateViolation, UserError
 from xb_muscle_ros.models.compiled import compiled
 from xb_muscle_ros.models.composition import Outputs as Outputs
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.models.inputs import check, check_samples
+from xb_muscle_ros.models.inputs import check, check_samples, check_states
 from xb_muscle_ros.models.registry import compose, model_of_set
 
 Array = npt.NDArray[np.float64]
 
 # The fixed stepper's guard: an embedded error of 1e-4 is 0.02 % of F0; smooth input at 1 ms stays 100 times below it.
-_DOUBLE = np.dtype(np.float64)
 GUARD = 1e-4
 SCRATCH_ROWS = 14  # four for the loops, the others for a model's step
 _LONGEST_SETTLING_S = 1e6
 _ON_THE_WAY = 1e-4  # embedded error of the steps on the way to rest
 
+_DOUBLE = np.dtype(np.float64)
 _WARM: set[Any] = set()  # compiled modules that have taken a step in this process
 
 _REMEDIES = (  # by result code of the compiled loops
@@ -189,7 +189,12 @@ class Muscle:
         return Outputs(*self._out.tolist())
 
     def outputs_of(self, states: Array) -> dict[str, Array]:
-        """The same for many states, shape (n, state): arrays of shape (n,) by name of `Outputs`."""
+        """The same for many states, shape (n, state): arrays of shape (n,) by name of `Outputs`.
+
+        Raises:
+            UserError: no states of this fibre.
+        """
+        check_states(states, len(states), self._n)
         table = np.zeros((states.shape[0], len(Outputs._fields)))
         self.code.outputs_of(states, self.parameters, table)
         return {name: table[:, i].copy() for i, name in enumerate(Outputs._fields)}
@@ -274,8 +279,10 @@ class Muscle:
         """State after `duration_s` at the state's own length with calcium (µM) held, by the method's best steps.
 
         Raises:
+            UserError: no state of this fibre.
             StateViolation: see `step`.
         """
+        self.check_state(state)
         length = float(state[-3])
         step_s = self._settling.step_s
         if step_s is None:
@@ -304,7 +311,7 @@ class Muscle:
         Raises:
             UserError: it is of another model, no array of 64-bit numbers, or the stride is below 1.
         """
-        if type(state) is not np.ndarray or state.shape != self._shape or state.dtype != _DOUBLE:
+        if not isinstance(state, np.ndarray) or state.shape != self._shape or state.dtype != _DOUBLE:
             found = f"{getattr(state, 'dtype', type(state).__name__)} of shape {getattr(state, 'shape', '?')}"
             raise UserError(
                 f"fibre {self.fibre.name}, model {self.fibre.model}: a state is float64 of shape ({self._n},), not "

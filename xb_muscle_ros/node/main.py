@@ -40,6 +40,7 @@ def _play(arguments: list[str], stop: program.Stop) -> None:
         executor.shutdown()
     finally:
         node.close()
+        program.take_in_news()
         node.destroy_node()
 
 

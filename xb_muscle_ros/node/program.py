@@ -7,12 +7,15 @@ from __future__ import annotations
 import re
 import signal
 import sys
+import time
 from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any
 
 from xb_muscle_ros import programs
 from xb_muscle_ros.errors import UserError
+
+_NEWS_S = 0.1
 
 Stop = Callable[[], bool]
 
@@ -61,6 +64,15 @@ def _code(name: str, usage: str, play: Callable[[list[str], Stop], None], argume
         print(f"{name}: {error}", file=sys.stderr)
         return 2
     return 0
+
+
+def take_in_news() -> None:
+    """Wait before a participant ends, while Fast DDS may still take in that others have left, which takes it some ms.
+
+    Fast DDS 2.14 may hang for ever otherwise: ``DomainParticipant::set_listener``, which the middleware calls at the
+    end, holds a lock while it waits for a discovery callback, which waits for that lock.
+    """
+    time.sleep(_NEWS_S)
 
 
 def created(make: Callable[[], Any]) -> Any:

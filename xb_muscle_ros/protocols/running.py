@@ -44,7 +44,8 @@ def answered(asked: Iterable[Callable[[], Run]], lacking: list[str] | None) -> I
     Raises:
         NoAnswer: there is none at all, or none for one of them and no `lacking`.
     """
-    last, any_answer = None, False
+    problems: list[str] = []
+    any_answer = False
     for ask in asked:
         try:
             run = ask()
@@ -52,12 +53,12 @@ def answered(asked: Iterable[Callable[[], Run]], lacking: list[str] | None) -> I
             if lacking is None:
                 raise
             lacking.append(f"{problem}; the trial is left out")
-            last = problem
+            problems.append(str(problem))
             continue
         any_answer = True
         yield run
-    if last is not None and not any_answer:
-        raise last
+    if problems and not any_answer:
+        raise NoAnswer("; ".join(problems))
 
 
 def with_force(run: Run, fibre: Fibre, as_measured: bool) -> Run:

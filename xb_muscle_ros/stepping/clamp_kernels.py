@@ -47,9 +47,9 @@ def clamp(
 ) -> Any:  # fmt: skip
     """Carry a state over `dt` seconds to the length at which its force is the load, moving linearly to it.
 
-    The search starts where the last velocity leads to, or a stride from the length that the fibre has. It goes on by
-    secants, outwards by no more than a stride until the load is bracketed, and falls back on halving. Lengths that no
-    step reaches bound it as the limits do.
+    The search starts where the last velocity leads to, or a stride from the length that the fibre has; that length is
+    the second trial where the load seems to lie farther away. It goes on by secants, outwards by no more than a stride
+    until the load is bracketed, and falls back on halving. Lengths that no step reaches bound it as the limits do.
 
     Args:
         s: state vector, shape (n,).
@@ -85,6 +85,7 @@ def clamp(
     before = math.nan
     excess_before = math.nan
     nearest = math.inf
+    nearest_force = math.nan
     nearest_at = math.nan
     width = math.inf
     since = 0
@@ -94,6 +95,7 @@ def clamp(
     steps = 0
     settled = False
     ended = False
+    asked = False
     for _ in range(MOST_TRIALS + int((longest - shortest) / STRIDE)):
         code, fault, t, _, _, tried = advance(s, x, calcium, dt, p, h, tol, out, work)
         steps += tried
@@ -110,6 +112,7 @@ def clamp(
             excess = g
             if abs(g) < abs(nearest):
                 nearest = g
+                nearest_force = shown[0]
                 nearest_at = x
             if g < 0.0:
                 below = x
@@ -132,7 +135,23 @@ def clamp(
             x = 0.5 * (x + last)
             if abs(x - last) >= 1e-6:
                 continue
-            return (WEAK_TO_END if excess < 0.0 else STRONG_TO_END), -1, nearest + aim, last, steps, halvings
+            return (WEAK_TO_END if excess < 0.0 else STRONG_TO_END), -1, nearest_force, last, steps, halvings
+        if asked:
+            asked = False
+            if (excess < 0.0) == (excess_before < 0.0):
+                # It does: the search goes on from the trial beyond.
+                last, before = before, last
+                excess, excess_before = excess_before, excess
+            else:
+                # It does not: force falls from there to the trial beyond, and the way is the other one.
+                below = last if excess < 0.0 else -math.inf
+                above = math.inf if excess < 0.0 else last
+                before = math.nan
+        elif math.isnan(before) and last != start and (excess < 0.0) == (last > start):
+            # Farther away, by the first trial; what the fibre bears at its own length is to say so too.
+            asked = True
+            x = start
+            continue
         slope = (excess - excess_before) / (last - before)
         if math.isinf(below) or math.isinf(above):
             # Outwards by secants that may overshoot; where force does not rise with length, by strides.
@@ -149,8 +168,8 @@ def clamp(
             room = math.copysign(1.0, move) * (bound - last)
             if room < 1e-6:
                 if ended:
-                    return (WEAK_TO_END if excess < 0.0 else STRONG_TO_END), -1, nearest + aim, last, steps, halvings
-                return (TOO_WEAK if excess < 0.0 else TOO_STRONG), -1, nearest + aim, nearest_at, steps, halvings
+                    return (WEAK_TO_END if excess < 0.0 else STRONG_TO_END), -1, nearest_force, last, steps, halvings
+                return (TOO_WEAK if excess < 0.0 else TOO_STRONG), -1, nearest_force, nearest_at, steps, halvings
             x = last + move if abs(move) < room else 0.5 * (last + bound)
             continue
         x = last - excess / slope
@@ -182,7 +201,7 @@ def clamp(
             stubborn = 0
         else:
             break
-    return NOT_HELD, -1, nearest + aim, nearest_at, steps, halvings
+    return NOT_HELD, -1, nearest_force, nearest_at, steps, halvings
 
 
 def clamp_run(

@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.node.program import make_executor
+from xb_muscle_ros.node.program import make_executor, take_in_news
 from xb_muscle_ros.node.status import Account
 
 _ANSWER_S = 10.0
@@ -76,6 +76,7 @@ class Link:
         """Leave the graph."""
         self._executor.remove_node(self.node)
         self._executor.shutdown()
+        take_in_news()
         self.node.destroy_node()
         self._context.try_shutdown()
 

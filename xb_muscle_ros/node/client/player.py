@@ -144,6 +144,7 @@ class Player:
         self._shares, self._loads = np.empty(0), topic == "load"
         self._calcium = Sender(node, "muscle/calcium", [fibre])
         self._driver = (LoadSender if self._loads else Sender)(node, f"muscle/{topic}", [fibre])
+        self._ends = (self._driver, self._calcium)
         self._inlets = [
             subscribe(node, "muscle/force", self._on_force, reliable()),
             subscribe(node, "muscle/moments", self._on_moments, reliable()),
@@ -162,12 +163,12 @@ class Player:
         Raises:
             UserError: they do not in time.
         """
-        ends = (self._driver.publisher, self._calcium.publisher)
+        ends = [end.publisher for end in self._ends]
         if not self._link.wait_for(lambda: all(end.get_subscription_count() for end in ends), timeout_s):
             raise UserError(f"node {self._link.peer} does not listen to {ends[0].topic_name}; check its remappings")
 
     def _check_alone(self) -> None:
-        topics = [end.publisher.topic_name for end in (self._driver, self._calcium)]
+        topics = [end.publisher.topic_name for end in self._ends]
 
         def others() -> int:
             return sum(self._link.node.count_publishers(topic) - 1 for topic in topics)
@@ -202,31 +203,49 @@ class Player:
         self._link.set_parameters(
             {"constants.reference_length_m": facts.reference_length_m, "constants.f0_n": facts.f0_n}
         )
+        stopped: Stopped | None = None
         for wait in (False, True):
-            listeners = self._driver.publisher.get_subscription_count()
-            self._play(trial, plan, wait)
-            late = self._driver.publisher.get_subscription_count() - listeners
+            listeners = self._listeners()
+            try:
+                self._play(trial, plan, wait)
+                stopped = None
+            except Stopped as problem:
+                stopped = problem
+            self._tell_of_latecomers(facts.trial, listeners)
             account = self._link.reset()
-            if late > 0:
-                warnings.warn(
-                    f"trial {facts.trial}: {late} more subscription{'s' * (late > 1)} of "
-                    f"{self._driver.publisher.topic_name} came while the trial was played and did not hear its "
-                    "beginning; start recorders first and play the trial again",
-                    DataWarning,
-                    stacklevel=3,
-                )
             if account.calcium == self._sent_calcium and account.late == 0:
-                return Simulated(
-                    time_s=trial.time_s,
-                    force_n=self._force[:, 0],
-                    ce_length_m=self._force[:, 1],
-                    ce_velocity_m_per_s=self._force[:, 2],
-                    moments={name: self._moments[:, i] for i, name in enumerate(MOMENTS)},
+                break
+        else:
+            if stopped is None:
+                raise UserError(
+                    f"trial {facts.trial}: node {self._link.peer} took {account}; {self._sent_calcium} calcium samples "
+                    "were sent; leave the machine more time, or end what else publishes calcium"
                 )
-        raise UserError(
-            f"trial {facts.trial}: node {self._link.peer} took {account}; {self._sent_calcium} calcium samples were "
-            "sent; leave the machine more time, or end what else publishes calcium"
+        if stopped is not None:
+            raise stopped
+        return Simulated(
+            time_s=trial.time_s,
+            force_n=self._force[:, 0],
+            ce_length_m=self._force[:, 1],
+            ce_velocity_m_per_s=self._force[:, 2],
+            moments={name: self._moments[:, i] for i, name in enumerate(MOMENTS)},
         )
+
+    def _listeners(self) -> dict[str, int]:
+        """How many listen to each topic; a recorder hears calcium, and length, but loads perhaps not."""
+        return {end.publisher.topic_name: end.publisher.get_subscription_count() for end in self._ends}
+
+    def _tell_of_latecomers(self, trial: str, before: dict[str, int]) -> None:
+        now = self._listeners()
+        came = {topic: count - before[topic] for topic, count in now.items() if count > before[topic]}
+        if came:
+            told = " and ".join(f"{count} of {topic}" for topic, count in came.items())
+            warnings.warn(
+                f"trial {trial}: more subscriptions came while the trial was played and did not hear its beginning "
+                f"({told}); start recorders first and play the trial again",
+                DataWarning,
+                stacklevel=3,
+            )
 
     def _play(self, trial: Trial, plan: Plan, wait: bool) -> None:
         stamps = plan.stamps
@@ -246,14 +265,21 @@ class Player:
 
     def _start(self, trial: Trial, plan: Plan, wait: bool) -> None:
         """Send the first sample, and again after a reset while the node's answers may not find their way yet."""
+        sent_s = time.monotonic()
 
         def send() -> None:
+            nonlocal sent_s
+            sent_s = time.monotonic()
             self._sent_calcium, self._newest_calcium = 0, -1
             self._send_calcium(trial, plan, [int(plan.held[0])], wait)
             self._driver.send(int(plan.stamps[0]), 0.0 if self._loads else trial.length_m[0])
 
+        def answered() -> bool:
+            self._look_for_fault(sent_s, trial)
+            return bool(self._missing[0] == 0)
+
         patience = self._timeout_s if self._met else _HANDSHAKE_S
-        self._met = self._link.begin(send, lambda: bool(self._missing[0] == 0), self._timeout_s, patience)
+        self._met = self._link.begin(send, answered, self._timeout_s, patience)
         if not self._met:
             self._give_up(0, trial, plan)
 
@@ -290,19 +316,27 @@ class Player:
             now = int(missing.sum())
             if now < before:
                 answered_s = time.monotonic()
-            elif self._fault and self._fault_at_s > answered_s + _NEWER_S:
-                self._link.reset()
-                raise Stopped(f"trial {trial.facts.trial}: node {self._link.peer} stopped: {self._fault}")
-            elif time.monotonic() >= answered_s + self._timeout_s:
+            self._look_for_fault(answered_s, trial)
+            if now == before and time.monotonic() >= answered_s + self._timeout_s:
                 self._give_up(window.start + int(np.flatnonzero(missing)[0]), trial, plan)
             before = now
+
+    def _look_for_fault(self, since_s: float, trial: Trial) -> None:
+        """Raise what the node tells of a stop some time after its last answer, or after what it was asked (steady, s).
+
+        Raises:
+            Stopped: it tells of one.
+        """
+        if self._fault and self._fault_at_s > since_s + _NEWER_S:
+            raise Stopped(f"trial {trial.facts.trial}: node {self._link.peer} stopped: {self._fault}")
 
     def _give_up(self, k: int, trial: Trial, plan: Plan) -> None:
         missing = int(self._missing[k])
         what = "force" if missing & 1 else "moments" if missing & 2 else "length"
         raise UserError(
             f"trial {trial.facts.trial}: node {self._link.peer} sent no {what} for the sample stamped "
-            f"{plan.stamps[k] * 1e-9:.9f} s within {self._timeout_s:g} s; its log says whether it refused the sample"
+            f"{plan.stamps[k] * 1e-9:.9f} s within {self._timeout_s:g} s; its log says whether it "
+            "refused the sample, stopped or ended"
         )
 
     def _on_force(self, message: Joints) -> None:
