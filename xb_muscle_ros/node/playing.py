@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,24 +13,25 @@ import numpy as np
 from rclpy.qos import QoSDurabilityPolicy, QoSProfile, QoSReliabilityPolicy
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.node.audience import Audience
 from xb_muscle_ros.node.client.link import Link
 from xb_muscle_ros.node.client.wires import LoadSender, Sender
-from xb_muscle_ros.node.joint_state import Joints
 from xb_muscle_ros.node.lateness import Lateness, LatenessSummary
 from xb_muscle_ros.node.ticker import make_waiter
-from xb_muscle_ros.node.traffic import subscribe
 from xb_muscle_ros.trials.stamps import to_ns
 from xb_muscle_ros.trials.trial import Array, Trial
 
-# While a first sample is held it is sent this often, s, so that no watchdog takes it for lost.
+# A sample that is held is sent this often, s.
 _HELD_EVERY_S = 0.01
-# Between trials: what came as an answer is served, and a wish to stop is heard.
+# Where samples are far apart, what comes back is heard in between.
 _SERVED_EVERY_S = 0.1
-_SETTLED_S = 0.3
+# For so long what became of a trial is waited for, s: a muscle node tells of itself once a second.
+_TOLD_S = 1.5
 # Who listens to length is found together with who listens to calcium, or soon before.
 _CALCIUM_S = 1.0
+# Faster lengths are sent without velocity: a node refuses those beyond 1000 L0/s.
+_FAST_L0_PER_S = 500.0
 _SECOND_NS = 1_000_000_000
-_ANSWERS = ("muscle/force", "muscle/measured_force")
 
 
 class Sent(NamedTuple):
@@ -41,6 +42,7 @@ class Sent(NamedTuple):
         joint: name of the fibre in the messages.
         time_s: of what drives the fibre, ascending, shape (n,), s.
         value: length (m) or load (N), shape (n,).
+        unit: one L0 (m) or one F0 (N) in it.
         calcium_time_s, calcium_um: shape (m,), s and µM.
     """
 
@@ -48,6 +50,7 @@ class Sent(NamedTuple):
     joint: str
     time_s: Array
     value: Array
+    unit: float
     calcium_time_s: Array
     calcium_um: Array
 
@@ -74,8 +77,9 @@ class Sent(NamedTuple):
         if np.any(np.diff(times) <= 0.0):
             k = int(np.flatnonzero(np.diff(times) <= 0.0)[0]) + 1
             raise UserError(f"trial {facts.trial}: samples of {what} do not ascend at {times[k]:.9f} s; mend the trial")
-        scale = 1.0 if unit is None else unit / one
-        return cls(facts.trial, joint or facts.fibre, times, scale * values, trial.calcium_time_s, trial.calcium_um)
+        sent = one if unit is None else unit
+        calcium = trial.calcium_time_s, trial.calcium_um
+        return cls(facts.trial, joint or facts.fibre, times, sent / one * values, sent, *calcium)
 
 
 @dataclass(frozen=True)
@@ -87,8 +91,10 @@ class Played:
         sent: samples of what drives the fibre.
         whole: whether that is all of them.
         lateness: of the samples against their time.
-        overdue: samples that came later than the next one was due.
-        answered_by: whose force was heard meanwhile.
+        overdue: samples that were sent after the next one was due.
+        answered_by: whose force was heard after the last sample.
+        refused: samples that the muscle node refused meanwhile, by its words.
+        fault: why the muscle node stopped; empty where it did not.
     """
 
     trial: str
@@ -98,6 +104,13 @@ class Played:
     lateness: LatenessSummary
     overdue: int
     answered_by: frozenset[str]
+    refused: Mapping[str, int]
+    fault: str
+
+    @property
+    def is_well(self) -> bool:
+        """Whether all was sent, taken and answered."""
+        return self.whole and self.joint in self.answered_by and not self.refused and not self.fault
 
 
 def play(
@@ -112,10 +125,10 @@ def play(
     namespace: str = "",
     domain_id: int | None = None,
 ) -> Iterator[Played]:
-    """Send trials one after the other, each sample at its time after the first; stamps are those times of the system.
+    """Send trials one after the other, each sample at its time after the first, stamped with the time it is due at.
 
-    Nothing is asked of the other side and nothing reset: before each trial its first sample is held, while the muscle
-    comes to rest.
+    Nothing is reset on the other side: before each trial its first sample is held, while the muscle comes to rest, and
+    after each its last one, until it is known what became of it.
 
     Args:
         trials: what is sent.
@@ -124,116 +137,142 @@ def play(
         rest_s: for how long the first sample and its calcium are held, s.
         wait_s: how long a listener is waited for, s.
         stop: whether to end; asked before every sample.
-        say: hears one line on each trial before it is played.
+        say: hears one line on each trial before it is played, and on what the listener has otherwise.
         namespace, domain_id: of ROS.
 
     Yields:
-        what became of each trial that was begun, once it has ended.
+        what became of each trial of which something was sent, once it has ended.
 
     Raises:
         UserError: ROS cannot be used, or nobody listens in time.
     """
     with Link("muscle_protocol_player", namespace, domain_id) as link:
         link.stop = stop
-        heard: set[str] = set()
-
-        def hear(message: Joints) -> None:
-            heard.update(message.names)
-
-        for name in _ANSWERS:
-            subscribe(link.node, name, hear, QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT))
+        audience = Audience(link, topic)
         senders: dict[str, _Senders] = {}
         for trial in trials:
-            if stop():
-                break
             if trial.joint not in senders:
-                senders[trial.joint] = _Senders(link, trial.joint, topic)
-            ends = senders[trial.joint]
-            ends.meet(link, wait_s, say)
+                made = senders[trial.joint] = _Senders(link, trial.joint, topic)
+                audience.meet(made.driver.publisher, wait_s)
+                if not stop():
+                    made.look_for_calcium(say)
+                    audience.ask_node(trial.unit, say)
             if stop():
-                break
-            say(f"plays {trial.name} as {trial.joint} on {ends.topic_name}: {_duration_s(trial) / speed:.3g} s")
-            heard.clear()
-            _rest(link, ends, trial, rest_s, stop)
-            yield _played(link, ends, trial, speed, heard, stop)
+                return
+            ends = senders[trial.joint]
+            duration_s = float(trial.time_s[-1] - trial.time_s[0]) / speed
+            say(f"plays {trial.name} as {trial.joint} on {ends.driver.publisher.topic_name}: {duration_s:.3g} s")
+            before = dict(audience.refused or {})
+            _rest(ends, trial, rest_s)
+            if stop():
+                return
+            sent, lateness, overdue = _sent(ends, trial, speed, stop)
+            # What came before counts no more, also what was not heard yet.
+            ends.serve(_HELD_EVERY_S)
+            audience.names.clear()
+            reports = audience.reports
+            # Whoever listens goes on to be given the last sample, also where the trial was broken off.
+            ends.hold(
+                _TOLD_S,
+                lambda reports=reports, joint=trial.joint: (  # type: ignore[misc]
+                    joint in audience.names and (not audience.has_node or audience.reports > reports)
+                ),
+            )
+            now = audience.refused or {}
+            refused = {why: n - before.get(why, 0) for why, n in now.items() if n > before.get(why, 0)}
+            yield Played(
+                trial.name, trial.joint, sent, sent == trial.value.size, lateness, overdue, frozenset(audience.names),
+                refused, audience.fault,
+            )  # fmt: skip
 
 
 class _Senders:
-    """Publishers of one fibre's calcium and of what drives it."""
+    """Publishers of one fibre's calcium and of what drives it, whose stamps ascend."""
 
     def __init__(self, link: Link, joint: str, topic: str) -> None:
         # Who comes later gets the calcium that holds.
         kept = QoSProfile(
             depth=1, reliability=QoSReliabilityPolicy.RELIABLE, durability=QoSDurabilityPolicy.TRANSIENT_LOCAL
         )
-        self.calcium = Sender(link.node, "muscle/calcium", [joint], kept)
-        self._by_load = topic == "load"
-        self._driver = (LoadSender if self._by_load else Sender)(link.node, f"muscle/{topic}", [joint])
-        self.topic_name = self._driver.publisher.topic_name
+        self._link = link
+        self._calcium = Sender(link.node, "muscle/calcium", [joint], kept)
+        self.driver = (LoadSender if topic == "load" else Sender)(link.node, f"muscle/{topic}", [joint])
+        self._last_ns, self._value, self._calcium_um = 0, 0.0, 0.0
 
-    def meet(self, link: Link, wait_s: float, say: Callable[[str], None]) -> None:
-        """Wait for a listener; one of calcium there need not be.
+    def look_for_calcium(self, say: Callable[[str], None]) -> None:
+        """Say so where nobody listens to calcium."""
+        publisher = self._calcium.publisher
+        if not self._link.wait_for(lambda: bool(publisher.get_subscription_count()), _CALCIUM_S):
+            say(f"nobody listens to {publisher.topic_name}")
 
-        Raises:
-            UserError: there is none in time.
-        """
-        publisher = self._driver.publisher
-        if not link.wait_for(lambda: bool(publisher.get_subscription_count()), wait_s) and not link.stop():
-            raise UserError(
-                f"nobody listens to {self.topic_name} (looked for {wait_s:g} s); start what is to hear it, or look at "
-                "names, ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE"
-            )
-        calcium = self.calcium.publisher
-        if not link.wait_for(lambda: bool(calcium.get_subscription_count()), min(wait_s, _CALCIUM_S)):
-            say(f"nobody listens to {calcium.topic_name}")
+    def now_ns(self) -> int:
+        """Time of the system, ns, later than all stamps."""
+        return max(time.time_ns(), self._last_ns + 1)
 
-    def drive(self, stamp_ns: int, value: float, velocity: float) -> None:
-        """Send a length (m) with its velocity (m/s), or a load (N)."""
-        if isinstance(self._driver, LoadSender):
-            self._driver.send(stamp_ns, value)
+    def calcium(self, stamp_ns: int, calcium_um: float) -> None:
+        """Send calcium, µM."""
+        self._calcium_um = calcium_um
+        self._calcium.send(stamp_ns, calcium_um)
+
+    def drive(self, stamp_ns: int, value: float, velocity: float | None = None) -> None:
+        """Send a length (m), with its velocity (m/s) where that is known, or a load (N)."""
+        self._last_ns, self._value = stamp_ns, value
+        if isinstance(self.driver, LoadSender) or velocity is None:
+            self.driver.send(stamp_ns, value)
         else:
-            self._driver.send(stamp_ns, value, np.full(1, velocity))
+            self.driver.send(stamp_ns, value, np.full(1, velocity))
+
+    def serve(self, duration_s: float) -> None:
+        """Hear what comes back for some time."""
+        self._link.wait_for(lambda: False, duration_s)
+
+    def hold(self, duration_s: float, until: Callable[[], bool] = lambda: False) -> None:
+        """Send the last sample and its calcium again, once at least and for some time, until something is so."""
+        end = time.monotonic() + duration_s
+        while True:
+            # Again and again: a best-effort listener may miss one, and a watchdog may take it for lost.
+            now_ns = self.now_ns()
+            self._calcium.send(now_ns, self._calcium_um)
+            self.drive(now_ns, self._value, 0.0)
+            if until() or time.monotonic() >= end or self._link.stop():
+                return
+            self._link.wait_for(until, _HELD_EVERY_S)
 
 
-def _rest(link: Link, ends: _Senders, trial: Sent, rest_s: float, stop: Callable[[], bool]) -> None:
-    """Hold the first sample of a trial, and the calcium of that time; once at least."""
+def _rest(ends: _Senders, trial: Sent, rest_s: float) -> None:
+    """Hold the first sample of a trial, and the calcium of that time, or the first where that comes later."""
     before = int(np.searchsorted(trial.calcium_time_s, trial.time_s[0], side="right")) - 1
-    end = time.monotonic() + rest_s
-    while not stop():
-        # Again and again: a best-effort listener may miss one.
-        ends.calcium.send(time.time_ns(), float(trial.calcium_um[max(before, 0)]))
-        if time.monotonic() >= end:
-            return
-        ends.drive(time.time_ns(), float(trial.value[0]), 0.0)
-        link.wait_for(lambda: False, min(_HELD_EVERY_S, rest_s))
+    ends.calcium(ends.now_ns(), float(trial.calcium_um[max(before, 0)]))
+    ends.drive(ends.now_ns(), float(trial.value[0]), 0.0)
+    ends.hold(rest_s)
 
 
-def _played(link: Link, ends: _Senders, trial: Sent, speed: float, heard: set[str], stop: Callable[[], bool]) -> Played:
-    """Send one trial; names that are heard meanwhile come into `heard`."""
+def _sent(ends: _Senders, trial: Sent, speed: float, stop: Callable[[], bool]) -> tuple[int, LatenessSummary, int]:
+    """Send one trial; returns how many samples, how late, and how many after the next was due."""
     due, is_calcium, at = _schedule(trial, speed)
+    next_due = np.append(due[~is_calcium][1:], due[-1] + _SECOND_NS)
     # Towards the next sample, at the end still: whoever extrapolates is where that one will be.
     velocity = np.append(np.diff(trial.value) / np.diff(trial.time_s), 0.0) * speed
+    fast = np.abs(velocity) > _FAST_L0_PER_S * trial.unit
     wait, lateness, overdue, sent = make_waiter(), Lateness(), 0, 0
-    begin_ns, stamp_ns = time.monotonic_ns(), time.time_ns()
+    stamp_ns, begin_ns = ends.now_ns(), time.monotonic_ns()
     for k in range(due.size):
         deadline = begin_ns + int(due[k])
         while (rest := deadline - time.monotonic_ns()) > _SERVED_EVERY_S * _SECOND_NS and not stop():
-            link.wait_for(lambda: False, min(0.5 * rest / _SECOND_NS, _SERVED_EVERY_S))
+            ends.serve(min(0.5 * rest / _SECOND_NS, _SERVED_EVERY_S))
         if stop():
             break
         wait(deadline)
         i = int(at[k])
         if is_calcium[k]:
-            ends.calcium.send(stamp_ns + int(due[k]), float(trial.calcium_um[i]))
+            ends.calcium(stamp_ns + int(due[k]), float(trial.calcium_um[i]))
             continue
-        ends.drive(stamp_ns + int(due[k]), float(trial.value[i]), float(velocity[i]))
         late = time.monotonic_ns() - deadline
         lateness.note(late)
-        overdue += k + 1 < due.size and late > due[k + 1] - due[k] > 0
+        overdue += late > next_due[i] - due[k]
+        ends.drive(stamp_ns + int(due[k]), float(trial.value[i]), None if fast[i] else float(velocity[i]))
         sent += 1
-    link.wait_for(lambda: bool(heard), _SETTLED_S)
-    whole = sent == trial.value.size
-    return Played(trial.name, trial.joint, sent, whole, lateness.summary(), overdue, frozenset(heard))
+    return sent, lateness.summary(), overdue
 
 
 def _schedule(trial: Sent, speed: float) -> tuple[Array, Array, Array]:
@@ -248,7 +287,3 @@ def _schedule(trial: Sent, speed: float) -> tuple[Array, Array, Array]:
     order = np.lexsort((~is_calcium, due))
     at = np.concatenate([later, np.arange(trial.time_s.size)])
     return to_ns(due / speed)[order], is_calcium[order], at[order]
-
-
-def _duration_s(trial: Sent) -> float:
-    return float(trial.time_s[-1] - trial.time_s[0])
