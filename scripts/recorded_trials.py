@@ -90,7 +90,7 @@ def soft_spring(length_l0: Array, force_f0: Array, gamma: float) -> dict[str, fl
             # Next to nothing, so that what the forces do not tell stays where it was.
             return np.append(force - force_f0, 1e-3 * (z - start))
 
-        return least_squares(left, start, bounds=([-7.0, -0.5, 0.7], [5.0, 0.5, 6.0]))  # type: ignore[operator]
+        return least_squares(left, start, bounds=([-7.0, -0.5, 0.7], [5.0, 0.5, 6.0]))
 
     starts = [np.array([0.0, at, sharpness]) for at in (0.0, 0.1) for sharpness in (2.3, 4.0)]
     best = min((fit_from(start) for start in starts), key=lambda found: found.cost)

@@ -72,7 +72,7 @@ def test_former_ways_in_are_kept() -> None:
 
 def test_a_name_that_is_none_lists_those_that_are() -> None:
     with pytest.raises(AttributeError, match=r"no attribute 'simulat'; public are .*simulate"):
-        _ = xb.simulat  # type: ignore[attr-defined]
+        _ = xb.simulat
     assert set(xb.__all__) <= set(dir(xb))
 
 

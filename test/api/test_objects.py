@@ -56,7 +56,7 @@ def test_arrays_of_one_calcium_have_a_pca_and_phases() -> None:
 )
 def test_arrays_that_make_no_trial_are_refused(arrays: dict[str, object], words: str) -> None:
     with pytest.raises(xb.UserError, match=words):
-        xb.simulate(FIBRE, **arrays)  # type: ignore[arg-type]
+        xb.simulate(FIBRE, **arrays)
 
 
 def test_made_trials_are_written_and_read_back(tmp_path: Path) -> None:
@@ -102,7 +102,7 @@ def test_a_fibre_in_memory_is_taken_as_it_is(made: xb.SimulationResult) -> None:
 
 def test_trials_that_are_none_are_refused(made: xb.SimulationResult, bags: Path) -> None:
     with pytest.raises(xb.UserError, match="an object of type int"):
-        xb.replay([3], FIBRE)  # type: ignore[list-item]
+        xb.replay([3], FIBRE)
     with pytest.raises(xb.UserError, match="bags and trials in memory together"):
         xb.replay([bags, *made.trials], FIBRE)
     with pytest.raises(xb.UserError, match="have their own L0 and F0"):

@@ -10,12 +10,12 @@ from xb_muscle_ros.models.fibre_file import changed, load_fibre
 
 
 @pytest.fixture(scope="module")
-def problem():  # type: ignore[no-untyped-def]
+def problem():
     truth = load_fibre("18Dec2017a")
     return made_problem(truth, changed(truth, {"f": 100.0, "k21": 20.0}, "test"), (4.5,), ["f", "k21"])
 
 
-def test_least_squares_find_the_truth(problem) -> None:  # type: ignore[no-untyped-def]
+def test_least_squares_find_the_truth(problem) -> None:
     found = least_squares(problem)
     truth = load_fibre("18Dec2017a").values
     values = problem.fibre_at(found.z).values
@@ -25,7 +25,7 @@ def test_least_squares_find_the_truth(problem) -> None:  # type: ignore[no-untyp
     assert values["k21"] == pytest.approx(truth["k21"], rel=0.03)
 
 
-def test_collocation_ends_where_least_squares_do(problem) -> None:  # type: ignore[no-untyped-def]
+def test_collocation_ends_where_least_squares_do(problem) -> None:
     pytest.importorskip("casadi", reason="CasADi is not installed: pip install casadi")
     ours, theirs = least_squares(problem), collocation(problem)
     assert theirs.converged

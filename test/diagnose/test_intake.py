@@ -86,7 +86,7 @@ def test_coarse_samples_are_told_by_fibre(make: Make) -> None:
 
 def _refused(bags: list[Path], fibers: list[str], **more: object) -> str:
     with pytest.raises(UserError) as refusal:
-        read_fibres(bags, fibers, **more)  # type: ignore[arg-type]
+        read_fibres(bags, fibers, **more)
     line = str(refusal.value)
     assert "\n" not in line
     return line

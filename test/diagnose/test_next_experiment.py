@@ -73,7 +73,7 @@ def test_the_protocol_where_two_fibres_differ_most_is_proposed() -> None:
     assert "at 2 L0/s" in found.protocol.words
     forces = [simulate_trial(Muscle(f), found.protocol.trial).force_n for f in (one, other)]
     assert found.difference_f0 == pytest.approx(float(np.sqrt(np.mean((forces[0] - forces[1]) ** 2))))
-    assert propose(one, one, (), (9.0,)).difference_f0 == 0.0  # type: ignore[union-attr]
+    assert propose(one, one, (), (9.0,)).difference_f0 == 0.0
 
 
 def test_a_protocol_in_a_fibre_s_own_units() -> None:
@@ -111,7 +111,7 @@ def test_the_protocol_is_the_one_of_the_largest_difference(
     monkeypatch.setattr(next_experiment, "Muscle", lambda fibre: linear_fibre(*fibre.pair))
     monkeypatch.setattr(next_experiment, "simulate_trial", lambda muscle, trial: muscle(trial))
     pairs = [SimpleNamespace(name="f", pair=pair) for pair in (one, other)]
-    found = propose(*pairs, ("a", "b"), (6.2,))  # type: ignore[arg-type]
+    found = propose(*pairs, ("a", "b"), (6.2,))
     assert found is not None
     assert words in found.protocol.words
     assert found.separates == ("a", "b")
@@ -131,8 +131,8 @@ def test_protocols_without_a_solution_are_passed_over(monkeypatch: pytest.Monkey
     monkeypatch.setattr(next_experiment, "Muscle", lambda fibre: linear_fibre(*fibre.pair))
     monkeypatch.setattr(next_experiment, "simulate_trial", simulate)
     pairs = [SimpleNamespace(name="f", pair=pair) for pair in ((1.0, 0.0), (3.0, 0.0))]
-    found = propose(*pairs, (), (6.2,))  # type: ignore[arg-type]
+    found = propose(*pairs, (), (6.2,))
     assert found is not None
     assert "a shortening by 4 % L0" in found.protocol.words
     monkeypatch.setattr(next_experiment, "simulate_trial", lambda *_: simulate(None, menu("f", (6.2,))[0].trial))
-    assert propose(*pairs, (), (6.2,)) is None  # type: ignore[arg-type]
+    assert propose(*pairs, (), (6.2,)) is None

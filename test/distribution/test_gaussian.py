@@ -123,4 +123,4 @@ def test_attachment() -> None:
 def test_unknown_rate_is_refused() -> None:
     with pytest.raises(TypeError, match="GaussianSpread"):
         # The wrong type is what is tried.
-        Gaussian().outflow(Quantities({"q0": 1.0, "q1": 0.0, "q2": 1.0}, "test", None), GaussianSpread(1.0, 1.0))  # type: ignore[arg-type]
+        Gaussian().outflow(Quantities({"q0": 1.0, "q1": 0.0, "q2": 1.0}, "test", None), GaussianSpread(1.0, 1.0))

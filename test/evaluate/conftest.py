@@ -95,7 +95,7 @@ def make(tmp_path: Path) -> RecordingMaker:
     """Write a trial (by default `recording` with these arguments) as a bag; gives its path."""
 
     def write(trial: Trial | None = None, name: str = "", **arguments: object) -> Path:
-        made = trial if trial is not None else recording(**arguments)  # type: ignore[arg-type]
+        made = trial if trial is not None else recording(**arguments)
         path = tmp_path / "bags" / (name or f"{made.facts.fibre}_{made.facts.trial}")
         write_trial(path, made)
         return path

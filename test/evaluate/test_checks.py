@@ -23,7 +23,7 @@ def good(recorded: Recorder) -> Trial:
 
 
 def facts(trial: Trial, **changes: object) -> Trial:
-    return replace(trial, facts=replace(trial.facts, **changes))  # type: ignore[arg-type]
+    return replace(trial, facts=replace(trial.facts, **changes))
 
 
 def gap(trial: Trial) -> Trial:

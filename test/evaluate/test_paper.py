@@ -55,7 +55,7 @@ def test_rmsd_of_a_constant_difference() -> None:
 
 @pytest.mark.parametrize("reading", ALL_READINGS)
 def test_readings_agree_where_nothing_is_in_doubt(reading: tuple[str, ...]) -> None:
-    found = score(table(1.0), DATA, reading, 7)  # type: ignore[arg-type]
+    found = score(table(1.0), DATA, reading, 7)
     assert found.rmsd["large"] == pytest.approx(0.2)
     assert found.rmsd["all"] == pytest.approx(0.2 * np.sqrt(80 / 84))
     assert found.conditions["large"] == (6 if reading[3] == "text" else 12)

@@ -66,7 +66,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Drawn:
         profiles.draw_profiles(tmp_path / "p.png", {"parameters": rows, "level": 0.95})
         return kept[-1]
 
-    draw.kept = kept  # type: ignore[attr-defined]
+    draw.kept = kept
     return draw
 
 
@@ -130,7 +130,7 @@ def test_residuals_of_the_fit_fill_their_axis_however_far_off_the_start(
         replace(problem, coordinates=tuple(far)), Settings(1, level=None), Options(processes=0, quiet=True)
     )
     pages.draw(tmp_path, fitted, as_json(fitted, {}))
-    made = drawn.kept[0]  # type: ignore[attr-defined]
+    made = drawn.kept[0]
     for axes in made.axes[1::2]:
         lines = [line for line in axes.lines if line.get_linestyle() == "-" and len(line.get_xdata()) > 2]
         assert np.max(np.abs(lines[0].get_ydata())) > 0.3 * axes.get_ylim()[1]

@@ -43,7 +43,7 @@ Maker = Callable[..., list[Trial]]
         (["f"], (), {"k11": "k21", "k21": "f"}, {}, "tied itself"),
     ],
 )
-def test_choices_that_cannot_be(start, free, fixed, ties, choices, words) -> None:  # type: ignore[no-untyped-def]
+def test_choices_that_cannot_be(start, free, fixed, ties, choices, words) -> None:
     with pytest.raises(UserError, match=words):
         parameter_coordinates(start, free, fixed, ties, choices)
 
@@ -208,7 +208,7 @@ def test_features_of_a_simulation(truth: Fibre) -> None:
 )
 def test_features_that_cannot_be(change: dict[str, object]) -> None:
     with pytest.raises(UserError, match="feature"):
-        replace(F0_ANCHOR, **change)  # type: ignore[arg-type]
+        replace(F0_ANCHOR, **change)
 
 
 def test_stretches_of_a_fibre_that_has_run_down_are_left_out(tmp_path: Path) -> None:

@@ -155,7 +155,7 @@ def test_held_out_trials_do_not_bear_on_the_fit(problem: Problem, fitted: Fitted
 )
 def test_nothing_to_do(problem: Problem, change: dict[str, object], words: str) -> None:
     with pytest.raises(UserError, match=words):
-        fit(replace(problem, **change), Settings(1), HERE)  # type: ignore[arg-type]
+        fit(replace(problem, **change), Settings(1), HERE)
 
 
 def test_no_finite_start(problem: Problem) -> None:

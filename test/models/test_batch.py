@@ -57,7 +57,7 @@ def test_one_step_for_all_fibres() -> None:
     batch = MuscleBatch([load_fibre(name) for name in FIBRES[:2]])
     states = batch.settle(np.zeros(2), np.ones(2))
     with pytest.raises(UserError, match="step of 2 fibres is an array; needed is one number of seconds"):
-        batch.step(states, np.zeros(2), np.ones(2), np.full(2, 1e-3))  # type: ignore[arg-type]
+        batch.step(states, np.zeros(2), np.ones(2), np.full(2, 1e-3))
 
 
 def test_step_and_outputs_in_one_pass_are_those_of_two() -> None:

@@ -59,7 +59,7 @@ def _module(folder: Path, text: str, name: str) -> ModuleType:
 def _called(lines: Any) -> Any:
     @njit(error_model="numpy")
     def call(s: Any, x: float, p: Any, out: Any) -> float:
-        return lines(s, x, p, out)  # type: ignore[no-any-return]
+        return lines(s, x, p, out)
 
     return call
 

@@ -52,5 +52,5 @@ def fragile(batch: MuscleBatch, index: int) -> MuscleBatch:
         weak.step(states[index], float(change[index]), float(calcium[index]), dt_s)
         return together(states, change, calcium, dt_s)
 
-    made.step = step  # type: ignore[method-assign]
+    made.step = step
     return made

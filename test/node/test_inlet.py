@@ -165,7 +165,7 @@ def test_calcium_that_comes_twice_is_no_refusal(one: Inlet, taken: Taken) -> Non
     def refuse(stamp: int, *values: Any) -> Any:
         return [Trouble(0, Refusal("stamp not after the last", "so it is"))]
 
-    taken.take_calcium = refuse  # type: ignore[method-assign]
+    taken.take_calcium = refuse
     one.take_calcium(message([1.0], ["left"]))
     one.take_calcium(message([2.0], ["left"]), latched=True)
     assert not one.refused

@@ -5,7 +5,6 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from background import Background
 
 pytest.importorskip("rclpy")
 
@@ -43,30 +43,23 @@ def trial_of(**changes: Any) -> Trial:
     return Trial(TrialFacts(FIBRE, "wavy", reference_length_m=0.03, f0_n=2.0), **{**given, **changes})
 
 
-class Audience:
+class Audience(Background):
     """Hears what is played, from a thread."""
 
     def __init__(self, domain: int, *topics: str, name: str = "audience") -> None:
+        super().__init__()
         self.heard: dict[str, list[Joints]] = {topic: [] for topic in topics}
         self._link = Link(name, domain_id=domain)
         # Deep, so that a machine that stands still for a moment loses none.
         deep = QoSProfile(depth=5000, reliability=QoSReliabilityPolicy.RELIABLE)
         self._kept = [subscribe(self._link.node, f"muscle/{topic}", self.heard[topic].append, deep) for topic in topics]
         self.publishers = self._link.node.count_publishers
-        self._end = threading.Event()
-        self._thread = threading.Thread(target=self._listen)
 
-    def _listen(self) -> None:
-        while not self._end.is_set():
+    def work(self) -> None:
+        while not self.ended.is_set():
             self._link.wait_for(lambda: False, 0.05)
 
-    def __enter__(self) -> Audience:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._end.set()
-        self._thread.join(10.0)
+    def close(self) -> None:
         self._link.close()
 
 
@@ -181,6 +174,8 @@ def test_a_node_in_realtime_answers_as_the_model_does(new_domain: Callable[[], i
     assert other.returncode == 1
     assert f"force of {FIBRE} alone was heard at its end" in other.stderr
     assert "knows fibre stranger" in other.stderr
+    # Regression: what the node had refused of the one before was told of this one too.
+    assert "refused" not in other.stderr
 
 
 def test_nobody_listens(new_domain: Callable[[], int]) -> None:

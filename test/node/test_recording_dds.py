@@ -6,13 +6,13 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+from background import Background
 
 rclpy = pytest.importorskip("rclpy")
 
@@ -38,10 +38,11 @@ FACTS = {
 PERIOD_S = 0.002
 
 
-class Laboratory:
+class Laboratory(Background):
     """Publishes length, calcium and force of a fibre from a thread."""
 
     def __init__(self, domain: int, reliable: bool = True) -> None:
+        super().__init__()
         self.context = Context()
         self.context.init(args=[], domain_id=domain)
         self.node = rclpy.create_node("laboratory", context=self.context, use_global_arguments=False)
@@ -52,8 +53,6 @@ class Laboratory:
         self.length = self.node.create_publisher(JointState, "/muscle/length", plain)
         self.force = self.node.create_publisher(JointState, "/muscle/measured_force", plain)
         self.sent = 0
-        self._end = threading.Event()
-        self._thread = threading.Thread(target=self._work)
         self.calcium.publish(self.message(0, position=[0.8]))
 
     def message(self, k: int, **values: list[float]) -> JointState:
@@ -61,23 +60,17 @@ class Laboratory:
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(k * round(PERIOD_S * 1e9), 10**9)
         return message
 
-    def _work(self) -> None:
+    def work(self) -> None:
         end = time.monotonic() + 20.0
         while not (self.length.get_subscription_count() and self.force.get_subscription_count()):
-            if self._end.wait(0.01) or time.monotonic() > end:
+            if self.ended.wait(0.01) or time.monotonic() > end:
                 return
-        while not self._end.wait(PERIOD_S):
+        while not self.ended.wait(PERIOD_S):
             self.length.publish(self.message(self.sent, position=[0.03 + 1e-6 * self.sent]))
             self.force.publish(self.message(self.sent, effort=[10.0 + 1e-3 * self.sent]))
             self.sent += 1
 
-    def __enter__(self) -> Laboratory:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._end.set()
-        self._thread.join(10.0)
+    def close(self) -> None:
         take_in_news()
         self.node.destroy_node()
         self.context.try_shutdown()

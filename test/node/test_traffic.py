@@ -64,11 +64,11 @@ def answers(domain: int, namespace: str, as_bytes: bool, names: list[str], monke
             message.header.stamp.nanosec = 1_000_000 * k
             for i, (sender, base) in enumerate(zip(senders, (5.0, 1.0), strict=True)):
                 # The length after the calcium has arrived.
-                until(lambda k=k, i=i: i == 0 or max(t.run.calcium_samples for t in stepping._timelines) > k)  # type: ignore[misc]
+                until(lambda k=k, i=i: i == 0 or max(t.run.calcium_samples for t in stepping._timelines) > k)
                 message.position = [base * (1.0 + 1e-3 * k * (1 + NAMES.index(name))) for name in order]
                 message.velocity = [0.0] * len(order) if k % 2 else []
                 sender.publish(message)
-            until(lambda k=k: all(len(kept) == k + 1 for kept in heard.values()))  # type: ignore[misc]
+            until(lambda k=k: all(len(kept) == k + 1 for kept in heard.values()))
         return {topic: [said(message) for message in kept] for topic, kept in heard.items()}
     finally:
         muscle.close()

@@ -78,7 +78,7 @@ def test_size_is_what_all_the_rest_cannot_take_up(pair: Composite) -> None:
     shifts, gain = pair.ordinary.pca_shift, pair.ordinary.length_gain
     given = [trial.stimulus(shifts[trial.pca], gain) for trial in pair.study]
 
-    def force(concealed: list[Concealed], values: dict[str, float], stimuli: list) -> np.ndarray:  # type: ignore[type-arg]
+    def force(concealed: list[Concealed], values: dict[str, float], stimuli: list) -> np.ndarray:
         return np.concatenate(study_forces(dressed(concealed, base.with_values(values)), stimuli, COARSE))
 
     whole = force(pair.concealed, pair.values, given)

@@ -157,7 +157,7 @@ def _tool(monkeypatch: pytest.MonkeyPatch, seen: list[str]) -> None:
         return diagnosed(SAID[studies]), None
 
     module = types.ModuleType("xb_muscle_ros.diagnose.run")
-    module.diagnose = diagnose  # type: ignore[attr-defined]
+    module.diagnose = diagnose
     monkeypatch.setitem(sys.modules, "xb_muscle_ros.diagnose.run", module)
     monkeypatch.setattr(intake, "read_fibres", lambda bags, fibers: fibers[0].parent.name)
     monkeypatch.setattr(outputs, "write", lambda out, found, files, report: None)

@@ -41,7 +41,7 @@ def test_an_unconditioned_stretch_without_force_has_no_ratio() -> None:
     assert np.isnan(one_class([10.0], [0.0])).all()
 
 
-def fibres() -> list:  # type: ignore[type-arg]
+def fibres() -> list:
     """Three fibres at low activation: ratios 0.5, 0.8, -2 (a passive reference of next to nothing)."""
     pairs = [(10.0, 20.0), (8.0, 10.0), (0.2, -0.1)]
     return [by_class(np.array([[a]]), np.array([b]), np.array([LOW])) for a, b in pairs]

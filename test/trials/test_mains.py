@@ -76,7 +76,7 @@ def test_a_notch_has_no_phase() -> None:
         ),
     ],
 )
-def test_what_cannot_be_filtered_is_said(change, said) -> None:  # type: ignore[no-untyped-def]
+def test_what_cannot_be_filtered_is_said(change, said) -> None:
     with pytest.raises(UserError, match=said):
         notched(change(recorded()), [600.0])
 

@@ -55,7 +55,7 @@ def test_without_room_for_a_file_bytes_are_in_memory(monkeypatch: pytest.MonkeyP
                 raise FileNotFoundError(2, "No usable temporary directory found")
             super().__init__()
 
-        def write(self, data: bytes) -> int:  # type: ignore[override]  # bytes are all it gets
+        def write(self, data: bytes) -> int:
             left = room - self.tell()
             if left <= 0:
                 raise OSError(28, "No space left on device")

@@ -74,7 +74,7 @@ def test_keys_see_the_code_of_a_function_outside_the_package(tmp_path: Path, mon
     for body in ("return 1", "return 2"):
         (tmp_path / "changing.py").write_text(f"def function(task):\n    {body}\n")
         sys.modules.pop("changing", None)
-        import changing  # type: ignore[import-not-found]
+        import changing
 
         keys.add(Keys(changing.function).of(None))
     sys.modules.pop("changing")

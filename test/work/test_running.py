@@ -118,12 +118,12 @@ def test_memory_does_not_grow_with_the_number_of_tasks(tmp_path: Path) -> None:
 @pytest.mark.parametrize("function", [lambda i: i, print, list], ids=["lambda", "builtin", "class"])
 def test_a_function_that_others_cannot_import(function: object) -> None:
     with pytest.raises(TypeError, match="not a function of a module"):
-        run(function, [1])  # type: ignore[arg-type]
+        run(function, [1])
 
 
 def test_a_task_that_is_no_data(tmp_path: Path) -> None:
     with pytest.raises(TypeError):
-        run(work_tasks.complain_at_three, [{1}], Options(journal=tmp_path / "journal"))  # type: ignore[list-item]
+        run(work_tasks.complain_at_three, [{1}], Options(journal=tmp_path / "journal"))
 
 
 def test_processes_by_default_are_the_cores_allowed(monkeypatch: pytest.MonkeyPatch) -> None:

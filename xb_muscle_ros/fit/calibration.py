@@ -157,5 +157,7 @@ def _estimates(made: _Made, own: tuple[Coordinate, ...], begin: FitTrial) -> Arr
     rough = np.linspace(-reach, reach, _POINTS)
     nearest = float(rough[int(np.argmin([best(float(shift))[0] for shift in rough]))])
     step = float(rough[1] - rough[0])
-    found: Any = minimize_scalar(lambda x: best(x)[0], bounds=(nearest - step, nearest + step), method="bounded")  # type: ignore[call-overload]
+    # SciPy's types ask for the arguments beside bounds.
+    bounds = nearest - step, nearest + step
+    found: Any = minimize_scalar(lambda x: best(x)[0], bounds=bounds, args=(), method="bounded")
     return best(float(found.x))[1]

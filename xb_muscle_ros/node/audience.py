@@ -23,6 +23,8 @@ _OTHER = {"length": "load", "load": "length"}
 _CONTROL = {"length": "length", "load": "force"}
 # A muscle node is looked for this long once there is a listener, s.
 _NODE_S = 1.0
+# It tells of itself once a second.
+_REPORT_S = 1.5
 _SAME = 1e-6
 
 
@@ -33,7 +35,6 @@ class Audience:
         names: whose forces were heard since they were last forgotten.
         refused: samples that the muscle node has refused in all, with its words; None where it tells nothing.
         fault: why the muscle node stopped; empty where it did not.
-        reports: how often the muscle node has told of itself.
     """
 
     def __init__(self, link: Link, topic: str) -> None:
@@ -41,15 +42,19 @@ class Audience:
         self._link, self._topic = link, topic
         self.names: set[str] = set()
         self.refused: dict[str, int] | None = None
-        self.fault, self.reports = "", 0
+        self.fault, self._has_reported = "", False
         newest = QoSProfile(depth=1, reliability=QoSReliabilityPolicy.BEST_EFFORT)
         self._kept = [subscribe(link.node, name, self._hear, newest) for name in _FORCES]
         self._kept.append(link.node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 10))
 
-    @property
-    def has_node(self) -> bool:
-        """Whether a muscle node is among those who listen."""
-        return bool(self._link.peer)
+    def forget(self) -> None:
+        """Forget whose forces were heard, and that the muscle node has told of itself."""
+        self.names.clear()
+        self._has_reported = False
+
+    def has_answered(self, joint: str) -> bool:
+        """Whether a fibre's force was heard since, and the muscle node, if there is one, has told of itself."""
+        return joint in self.names and (self._has_reported or not self._link.peer)
 
     def meet(self, publisher: Any, wait_s: float) -> None:
         """Wait until somebody other than a recorder hears a publisher.
@@ -106,6 +111,8 @@ class Audience:
                 f"one {what[0]} is {unit:g} {what[1]} in what is sent and {one:g} {what[1]} for node {link.peer}; "
                 f"--as-{what[0].lower()} '{one:g} {what[1]}' sends its own"
             )
+        # What it refused before is not of what is sent now.
+        link.wait_for(lambda: self.refused is not None, _REPORT_S)
 
     def _listeners(self, topic: str) -> list[str]:
         """Names of the nodes that listen; those not known yet are left out."""
@@ -121,4 +128,4 @@ class Audience:
                 counts = {pair.key: pair.value for pair in status.values if pair.key.startswith("refused: ")}
                 self.refused = {key.removeprefix("refused: "): int(value) for key, value in counts.items()}
                 self.fault = fault_in(status)
-                self.reports += 1
+                self._has_reported = True

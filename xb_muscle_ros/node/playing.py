@@ -7,6 +7,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -169,15 +170,9 @@ def play(
             sent, lateness, overdue = _sent(ends, trial, speed, stop)
             # What came before counts no more, also what was not heard yet.
             ends.serve(_HELD_EVERY_S)
-            audience.names.clear()
-            reports = audience.reports
+            audience.forget()
             # Whoever listens goes on to be given the last sample, also where the trial was broken off.
-            ends.hold(
-                _TOLD_S,
-                lambda reports=reports, joint=trial.joint: (  # type: ignore[misc]
-                    joint in audience.names and (not audience.has_node or audience.reports > reports)
-                ),
-            )
+            ends.hold(_TOLD_S, partial(audience.has_answered, trial.joint))
             now = audience.refused or {}
             refused = {why: n - before.get(why, 0) for why, n in now.items() if n > before.get(why, 0)}
             yield Played(

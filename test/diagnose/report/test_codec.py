@@ -67,7 +67,7 @@ def test_numbers_of_numpy_are_numbers() -> None:
 
 def test_what_has_no_place_in_json_is_an_error_of_the_program() -> None:
     with pytest.raises(TypeError, match="set"):
-        to_json(dataclasses.replace(one_fibre().diagnosis, notes=({"a"},)))  # type: ignore[arg-type]
+        to_json(dataclasses.replace(one_fibre().diagnosis, notes=({"a"},)))
 
 
 def changed(**changes: Any) -> dict[str, Any]:

@@ -54,7 +54,7 @@ def test_signals_of_another_length_are_refused() -> None:
 
 
 def save(path: Path, **arrays: object) -> None:
-    np.savez(path, **arrays)  # type: ignore[arg-type]
+    np.savez(path, **arrays)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def save(path: Path, **arrays: object) -> None:
 def test_damage_is_named(tmp_path: Path, damage: object, told: str) -> None:
     path = tmp_path / "traces.npz"
     write_traces(path, five_fibres().traces[:1])
-    damage(path)  # type: ignore[operator]
+    damage(path)
     with pytest.raises(UserError, match=told) as caught:
         read_traces(path)
     assert str(path) in str(caught.value)

@@ -99,7 +99,7 @@ def test_a_joint_step_is_that_of_least_squares(seed: int) -> None:
     residual, of_more = random.normal(size=n), random.uniform(0.5, 2.0, more)
     descent, linear = Descent.__new__(Descent), Linear.__new__(Linear)
     descent.system, descent.total, descent.information = system, float(weights.sum()), information
-    descent.problem = SimpleNamespace(coordinates=[SimpleNamespace(prior_mean=m) for m in means])  # type: ignore[assignment]
+    descent.problem = SimpleNamespace(coordinates=[SimpleNamespace(prior_mean=m) for m in means])
     descent.of_features = np.zeros((0, own))
     mean_square = float(weights @ residual**2) / descent.total
     linear.system, linear.descent, linear.slopes = system, descent, slopes
