@@ -53,11 +53,17 @@ class Audience(Background):
         # Deep, so that a machine that stands still for a moment loses none.
         deep = QoSProfile(depth=5000, reliability=QoSReliabilityPolicy.RELIABLE)
         self._kept = [subscribe(self._link.node, f"muscle/{topic}", self.heard[topic].append, deep) for topic in topics]
-        self.publishers = self._link.node.count_publishers
+        self._publishers = self._link.node.count_publishers
 
     def work(self) -> None:
         while not self.ended.is_set():
             self._link.wait_for(lambda: False, 0.05)
+
+    def wait_for_node(self) -> None:
+        """Until a muscle node is there: this one listens too, so a player does not wait for that."""
+        end = time.monotonic() + 60.0
+        while not self._publishers("muscle/force") and time.monotonic() < end:
+            time.sleep(0.1)
 
     def close(self) -> None:
         self._link.close()
@@ -126,6 +132,35 @@ def test_every_sample_comes_with_its_time(new_domain: Callable[[], int]) -> None
     assert np.all(np.diff([message.stamp_ns for message in audience.heard["length"]]) > 0)
 
 
+def test_a_fibre_is_brought_to_its_next_trial_at_a_steady_rate(new_domain: Callable[[], int]) -> None:
+    """Regression: length stepped at once, here by 4 % of L0."""
+    domain, first = new_domain(), trial_of()
+    next_ = trial_of(length_m=first.length_m + 0.04 * 0.03, calcium_um=np.full(4, 9.0))
+    said: list[str] = []
+    with Audience(domain, "length", "calcium") as audience:
+        time.sleep(0.5)
+        sent = [Sent.of(trial, "length") for trial in (first, next_)]
+        list(play(sent, rest_s=0.05, travel_per_s=0.1, wait_s=30.0, say=said.append, domain_id=domain))
+        time.sleep(0.3)
+    begin, goal = float(first.length_m[-1]), float(next_.length_m[0])
+    took = (goal - begin) / 0.03 / 0.1
+    assert f"brings {FIBRE} from {begin / 0.03:.4g} to {goal / 0.03:.4g} L0 within {took:.3g} s" in said
+    lengths = audience.heard["length"]
+    position = np.array([float(each.position[0]) for each in lengths])
+    # Of two samples with one length the later one begins the way, and the earlier one ends it.
+    left = int(np.flatnonzero(position == begin)[-1])
+    came = left + int(np.flatnonzero(position[left:] == goal)[0])
+    way = position[left : came + 1]
+    assert way.size == 1 + int(took / 1e-3) + 1
+    assert np.all(np.diff(way) > 0.0)
+    assert np.diff(way).max() <= 1.001 * 0.1 * 0.03 * 1e-3
+    velocity = [float(each.velocity[0]) for each in lengths[left + 1 : came]]
+    assert velocity == pytest.approx([0.1 * 0.03] * len(velocity))
+    # On the way the calcium is that of the first trial.
+    later = [each.stamp_ns for each in audience.heard["calcium"] if each.position[0] == 9.0]
+    assert later[0] > lengths[came - 1].stamp_ns
+
+
 @pytest.mark.slow
 def test_a_node_in_realtime_answers_as_the_model_does(new_domain: Callable[[], int], tmp_path: Path) -> None:
     """The command over real DDS: the isometric force, then that of a stretch; and a wrong name is said."""
@@ -137,9 +172,7 @@ def test_a_node_in_realtime_answers_as_the_model_does(new_domain: Callable[[], i
     command = [sys.executable, "-m", "xb_muscle_ros.cli.main", "play", str(bag), "--wait", "60"]
     parameters = {"fiber_file": FIBRE, "mode": "realtime", "rate_hz": 500.0, "extrapolate": True, "max_catch_up": 100}
     with NodeProcess(domain, parameters) as node, Audience(domain, "force") as audience:
-        end = time.monotonic() + 60.0
-        while not audience.publishers("muscle/force") and time.monotonic() < end:
-            time.sleep(0.1)
+        audience.wait_for_node()
         done = subprocess.run(
             [*command, "--rest", "4"],
             env=child_environment(domain),
@@ -206,6 +239,7 @@ def test_loads_are_borne_and_a_muscle_that_dies_is_noticed(new_domain: Callable[
     parameters = {"fiber_file": FIBRE, "mode": "realtime", "control": "force", "rate_hz": 500.0}
     said: list[str] = []
     with NodeProcess(domain, parameters) as node, Audience(domain, "load") as audience:
+        audience.wait_for_node()
 
         def stop() -> bool:
             nonlocal asked
@@ -217,8 +251,9 @@ def test_loads_are_borne_and_a_muscle_that_dies_is_noticed(new_domain: Callable[
         played: list[Any] = []
         for each in play([sent, sent], "load", rest_s=0.5, wait_s=60.0, stop=stop, say=said.append, domain_id=domain):
             played.append(each)
+        log = node.log()
     first, second = played
-    assert first.is_well, (first, node.log())
+    assert first.is_well, (first, log)
     assert (second.sent, second.answered_by, second.is_well) == (100, frozenset(), False)
     assert not any("one F0" in line or "lockstep" in line for line in said)
     assert np.all(np.diff([each.stamp_ns for each in audience.heard["load"]]) > 0)
@@ -254,6 +289,7 @@ def test_options(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for arguments, said in (
         (["--speed", "0"], "--speed is 0; allowed is 1e-06 to"),
         (["--rest", "-1"], "--rest is -1; allowed is 0 to"),
+        (["--travel", "0"], "--travel is 0; allowed is 0.001 to"),
         (["--as-f0", "20 N"], "--as-f0 is of no use with --drive length"),
         (["--drive", "load", "--as-l0", "3 mm"], "--as-l0 is of no use with --drive load"),
         (["--as-l0", "20 N"], "'N' is no unit of length"),

@@ -40,6 +40,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--rest", type=float, default=1.0, metavar="S",
         help="for how long the first sample of each trial is held before it, s (default 1)",
     )  # fmt: skip
+    parser.add_argument(
+        "--travel", type=float, default=0.5, metavar="RATE",
+        help="how fast a fibre goes from one trial to its next, L0/s, or F0/s with --drive load (default 0.5)",
+    )  # fmt: skip
     parser.add_argument("--wait", type=float, default=10.0, metavar="S", help="for a listener, s (default 10)")
     parser.add_argument("--namespace", default="", metavar="NAME", help="of what listens (default: none)")
     parser.add_argument(
@@ -54,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     import signal
     from functools import partial
 
-    for option, least in (("speed", 1e-6), ("rest", 0.0), ("wait", 1e-3)):
+    for option, least in (("speed", 1e-6), ("rest", 0.0), ("travel", 1e-3), ("wait", 1e-3)):
         value = getattr(arguments, option)
         if not least <= value <= 1e6:
             raise UserError(f"--{option} is {value:g}; allowed is {least:g} to 1e6")
@@ -77,8 +81,9 @@ def run(arguments: argparse.Namespace) -> int:
         signal.signal(number, lambda number, frame: asked.append(number))
     played = []
     for each in play(
-        sent, arguments.drive, speed=arguments.speed, rest_s=arguments.rest, wait_s=arguments.wait,
-        stop=lambda: bool(asked), say=partial(print, flush=True), namespace=arguments.namespace,
+        sent, arguments.drive, speed=arguments.speed, rest_s=arguments.rest, travel_per_s=arguments.travel,
+        wait_s=arguments.wait, stop=lambda: bool(asked), say=partial(print, flush=True),
+        namespace=arguments.namespace,
     ):  # fmt: skip
         played.append(each)
         _tell(each, bool(asked))

@@ -24,6 +24,8 @@ from xb_muscle_ros.trials.trial import Array, Trial
 
 # A sample that is held is sent this often, s.
 _HELD_EVERY_S = 0.01
+# On the way from one trial to the next a sample is sent this often, s.
+_ON_THE_WAY_EVERY_S = 1e-3
 # Where samples are far apart, what comes back is heard in between.
 _SERVED_EVERY_S = 0.1
 # For so long what became of a trial is waited for, s: a muscle node tells of itself once a second.
@@ -120,6 +122,7 @@ def play(
     *,
     speed: float = 1.0,
     rest_s: float = 1.0,
+    travel_per_s: float = 0.5,
     wait_s: float = 10.0,
     stop: Callable[[], bool] = lambda: False,
     say: Callable[[str], None] = lambda line: None,
@@ -129,13 +132,15 @@ def play(
     """Send trials one after the other, each sample at its time after the first, stamped with the time it is due at.
 
     Nothing is reset on the other side: before each trial its first sample is held, while the muscle comes to rest, and
-    after each its last one, until it is known what became of it.
+    after each its last one, until it is known what became of it. From there the fibre is brought to the first sample of
+    its next trial at a steady rate, under the calcium that it had, so that nothing is torn.
 
     Args:
         trials: what is sent.
         topic: ``length`` or ``load``, below ``muscle/``.
         speed: how many times faster than the trials' own time.
         rest_s: for how long the first sample and its calcium are held, s.
+        travel_per_s: rate from one trial to the next, L0/s or F0/s.
         wait_s: how long a listener is waited for, s.
         stop: whether to end; asked before every sample.
         say: hears one line on each trial before it is played, and on what the listener has otherwise.
@@ -161,6 +166,7 @@ def play(
             if stop():
                 return
             ends = senders[trial.joint]
+            ends.travel(float(trial.value[0]), trial.unit, travel_per_s, say)
             duration_s = float(trial.time_s[-1] - trial.time_s[0]) / speed
             say(f"plays {trial.name} as {trial.joint} on {ends.driver.publisher.topic_name}: {duration_s:.3g} s")
             before = dict(audience.refused or {})
@@ -192,7 +198,7 @@ class _Senders:
         self._link = link
         self._calcium = Sender(link.node, "muscle/calcium", [joint], kept)
         self.driver = (LoadSender if topic == "load" else Sender)(link.node, f"muscle/{topic}", [joint])
-        self._last_ns, self._value, self._calcium_um = 0, 0.0, 0.0
+        self._joint, self._last_ns, self._value, self._calcium_um = joint, 0, 0.0, 0.0
 
     def look_for_calcium(self, say: Callable[[str], None]) -> None:
         """Say so where nobody listens to calcium."""
@@ -216,6 +222,28 @@ class _Senders:
             self.driver.send(stamp_ns, value)
         else:
             self.driver.send(stamp_ns, value, np.full(1, velocity))
+
+    def travel(self, value: float, unit: float, per_s: float, say: Callable[[str], None]) -> None:
+        """Go from what was sent last, if anything was, to the first sample of a trial, and say so.
+
+        Args:
+            value: where to, m or N.
+            unit: one L0 (m) or one F0 (N) in it.
+            per_s: rate, L0/s or F0/s.
+            say: hears of it.
+        """
+        begin, way = self._value, value - self._value
+        if self._last_ns == 0 or way == 0.0:
+            return
+        duration_s = abs(way) / (unit * per_s)
+        name = "F0" if isinstance(self.driver, LoadSender) else "L0"
+        say(f"brings {self._joint} from {begin / unit:.4g} to {value / unit:.4g} {name} within {duration_s:.3g} s")
+        wait, begin_ns, steps = make_waiter(), time.monotonic_ns(), int(duration_s / _ON_THE_WAY_EVERY_S)
+        for k in range(1, steps + 1):
+            wait(begin_ns + int(k * _ON_THE_WAY_EVERY_S * _SECOND_NS))
+            if self._link.stop():
+                return
+            self.drive(self.now_ns(), begin + way * k * _ON_THE_WAY_EVERY_S / duration_s, way / duration_s)
 
     def serve(self, duration_s: float) -> None:
         """Hear what comes back for some time."""
