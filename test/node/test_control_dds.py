@@ -131,7 +131,7 @@ def test_a_stop_for_another_reason_ends_the_protocol(monkeypatch: pytest.MonkeyP
     from contextlib import contextmanager
 
     import xb_muscle_ros as xb
-    from xb_muscle_ros.node.client import player
+    from xb_muscle_ros.node.client import live, player
 
     class Ill:
         def play(self, trial: Any, shares: Any = None) -> Any:
@@ -141,7 +141,7 @@ def test_a_stop_for_another_reason_ends_the_protocol(monkeypatch: pytest.MonkeyP
     def playing(*_: Any, **__: Any) -> Iterator[Any]:
         yield Ill()
 
-    monkeypatch.setattr(player, "playing", playing)
+    monkeypatch.setattr(live, "playing", playing)
     for protocol in ("force-clamp", "twitch"):
         with pytest.raises(xb.UserError, match="state drx became 3"):
             xb.run_protocol(protocol, FIBRE, live=True, tell=lambda line: None)

@@ -22,7 +22,7 @@ FIBRE = "18Dec2017a"
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["gaussian", "characteristics"])
 def test_force_through_the_node_is_that_of_replay(method: str, domain: int, tmp_path: Path) -> None:
-    from xb_muscle_ros.node.client.player import play_live
+    from xb_muscle_ros.node.client.live import play_live
     from xb_muscle_ros.node.client.process import NodeProcess
 
     given = load_fibre(FIBRE, "3state_coop", method)

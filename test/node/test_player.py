@@ -80,7 +80,7 @@ def assert_same_bits(simulated: Any, expected: dict[str, Any]) -> None:
 @pytest.mark.slow
 def test_force_over_dds_is_offline_force_bit_for_bit(node: Any, muscle: Muscle) -> None:
     """Through real DDS and back, with calcium that changes on the way; twice, from one node."""
-    from xb_muscle_ros.node.client.player import play_live
+    from xb_muscle_ros.node.client.live import play_live
 
     trials = [wavy_trial("first"), wavy_trial("second", 300, start_s=0.0)]
     played = play_live(trials, muscle.fibre, namespace=node.namespace, domain_id=node.domain)
@@ -105,7 +105,7 @@ def test_calcium_that_came_late_is_noticed_and_the_trial_played_again(
 ) -> None:
     """The player asks the node whether calcium came in time, and repeats more slowly if not."""
     from xb_muscle_ros.node.client.link import Link
-    from xb_muscle_ros.node.client.player import play_live
+    from xb_muscle_ros.node.client.live import play_live
 
     reset, lied = Link.reset, []
 
@@ -126,7 +126,7 @@ def test_calcium_that_came_late_is_noticed_and_the_trial_played_again(
 
 def test_without_a_node_the_command_is_named(domain: int) -> None:
     """What to type in another terminal."""
-    from xb_muscle_ros.node.client.player import play_live
+    from xb_muscle_ros.node.client.live import play_live
 
     with pytest.raises(UserError, match=r"start one in another terminal: muscle_node .*18Dec2017a.*lockstep"):
         play_live([TRIAL], find_s=0.3, namespace="/nobody", domain_id=domain)
@@ -134,14 +134,14 @@ def test_without_a_node_the_command_is_named(domain: int) -> None:
 
 def test_nothing_to_play_needs_no_node(domain: int) -> None:
     """An empty list is no error."""
-    from xb_muscle_ros.node.client.player import play_live
+    from xb_muscle_ros.node.client.live import play_live
 
     assert play_live([], domain_id=domain) == []
 
 
 def test_another_fibre_or_model_is_refused(node: Any) -> None:
     """Fibre, model and every value must be those of the node."""
-    from xb_muscle_ros.node.client.player import play_live
+    from xb_muscle_ros.node.client.live import play_live
 
     where = {"namespace": node.namespace, "domain_id": node.domain}
     other = dataclasses.replace(TRIAL, facts=TrialFacts("13Dec2017a", "short"))
@@ -157,7 +157,7 @@ def test_another_fibre_or_model_is_refused(node: Any) -> None:
 
 def test_realtime_is_refused(start: Callable[..., Any]) -> None:
     """A node by the clock cannot be played sample by sample."""
-    from xb_muscle_ros.node.client.player import play_live
+    from xb_muscle_ros.node.client.live import play_live
 
     driver = start(mode="realtime")
     with pytest.raises(UserError, match=r"has mode = realtime, needed is lockstep"):
@@ -167,7 +167,7 @@ def test_realtime_is_refused(start: Callable[..., Any]) -> None:
 @pytest.mark.slow
 def test_a_second_publisher_is_refused(start: Callable[..., Any]) -> None:
     """Here it is the driver of these tests."""
-    from xb_muscle_ros.node.client.player import play_live
+    from xb_muscle_ros.node.client.live import play_live
 
     driver = start(mode="lockstep")
     trials = [wavy_trial(f"trial {k}", 300) for k in range(150)]
@@ -180,7 +180,8 @@ def test_a_second_publisher_is_refused(start: Callable[..., Any]) -> None:
 def test_who_listens_too_late_is_told_of(node: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A recorder that comes into the middle of a trial has a bag without its beginning."""
     from xb_muscle_ros.node.client.link import Link
-    from xb_muscle_ros.node.client.player import Player, play_live
+    from xb_muscle_ros.node.client.live import play_live
+    from xb_muscle_ros.node.client.player import Player
     from xb_muscle_ros.node.client.wires import reliable
     from xb_muscle_ros.node.traffic import subscribe
 
@@ -205,7 +206,8 @@ def test_who_listens_too_late_is_told_of(node: Any, monkeypatch: pytest.MonkeyPa
 
 def test_a_stop_at_the_first_sample_has_its_reason(node: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Regression: only what came after the first sample was told of; and the next trial is not held to blame for it."""
-    from xb_muscle_ros.node.client.player import Player, Stopped, playing
+    from xb_muscle_ros.node.client.live import playing
+    from xb_muscle_ros.node.client.player import Player, Stopped
 
     where = {"namespace": node.namespace, "domain_id": node.domain}
     with playing([TRIAL], **where) as player:
@@ -228,7 +230,7 @@ def test_a_stop_at_the_first_sample_has_its_reason(node: Any, monkeypatch: pytes
 @pytest.mark.slow
 def test_no_answer_names_trial_and_stamp(node: Any) -> None:
     """A sample that the node refuses is never answered."""
-    from xb_muscle_ros.node.client.player import play_live
+    from xb_muscle_ros.node.client.live import play_live
 
     length = np.array([1.0, 1.0, 9.0, 1.0, 1.0])
     trial = dataclasses.replace(TRIAL, length_m=length)

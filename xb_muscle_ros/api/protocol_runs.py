@@ -37,7 +37,8 @@ def answers(
     if not planned:
         return
     # The one place where this module touches ROS, and only when asked to.
-    from xb_muscle_ros.node.client.player import Player, Stopped, playing
+    from xb_muscle_ros.node.client.live import playing
+    from xb_muscle_ros.node.client.player import Player, Stopped
 
     def ask(player: Player, each: Planned) -> Run:
         by_load = bool(each.load.size)

@@ -152,7 +152,7 @@ def replay(
     player: Player | None = None
     if live:
         # The one place where this function touches ROS, and only when asked to.
-        from xb_muscle_ros.node.client.player import play_live
+        from xb_muscle_ros.node.client.live import play_live
 
         player = play_live
     results = replayed(found, chosen, player, substeps, settle)

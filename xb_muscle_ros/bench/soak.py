@@ -18,7 +18,7 @@ from xb_muscle_ros.bench.random_stretches import Stretches, random_stretches
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.batch import MuscleBatch
 from xb_muscle_ros.models.fibre_file import Fibre
-from xb_muscle_ros.node.client.player import play_live
+from xb_muscle_ros.node.client.live import play_live
 from xb_muscle_ros.node.client.process import NodeProcess, private_domain
 from xb_muscle_ros.node.inlet import Inlet
 from xb_muscle_ros.node.joint_state import Joints

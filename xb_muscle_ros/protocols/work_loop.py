@@ -24,9 +24,9 @@ from xb_muscle_ros.protocols.base import (
     Settings,
 )
 from xb_muscle_ros.protocols.calcium import pulse_train, transient_of, transient_options
-from xb_muscle_ros.protocols.figures import legend, lettered, looks
 from xb_muscle_ros.protocols.inputs import calcium_um, facts_of, rate_option
 from xb_muscle_ros.protocols.stimulation import stimulated
+from xb_muscle_ros.protocols.work_loop_figure import draw
 from xb_muscle_ros.scores.cycles import oscillations
 from xb_muscle_ros.scores.estimate import Estimate, rounded
 from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN, ForceNoise, noise_between
@@ -40,13 +40,6 @@ _LEAD_S = 0.1
 _SAME = 0.01
 # Fewer samples to a cycle change net work by more than 2 %.
 _LEAST_SAMPLES = 20.0
-# What trials may differ by: label of an axis, factor, and unit behind a number.
-_VARIED = {
-    "frequency_hz": ("cycle frequency (Hz)", 1.0, " Hz"),
-    "amplitude_l0": ("amplitude (% L$_0$)", 100.0, " % L$_0$"),
-    "phase": ("begin of stimulation (share of cycle)", 1.0, " phase"),
-    "duty": ("duty (share of cycle)", 1.0, " duty"),
-}
 _OF_CYCLE: Mapping[str, Column] = {
     "net_f0_l0": Column("net work", "10⁻³ F0·L0", ".3f", 1e3),
     "shortening_f0_l0": Column("shortening work", "10⁻³ F0·L0", ".3f", 1e3),
@@ -194,41 +187,7 @@ class WorkLoops(Protocol):
 
     def draw(self, figure: Any, found: Sequence[Found]) -> None:
         """Last loop of each trial with its direction, power against what varies, net work from cycle to cycle."""
-        loops, power, cycles = figure.subplots(1, 3, width_ratios=(1.4, 1.0, 1.0))
-        varied = _varied(found[0])
-        across = next((key for key in varied if np.all(np.isfinite(found[0].column(key)))), "frequency_hz")
-        for first, (look, each) in enumerate(looks(found)):
-            for k, row in enumerate(each.rows, 1):
-                length, force = each.curves[f"loop {k}"]
-                loops.plot(100.0 * length, force, **{**look.trace, "label": "_"})
-                _arrows(loops, 100.0 * length, force, look.trace["color"])
-                if first == 0:
-                    # At its peak, beside it where that is at the long end; loops of other models are near.
-                    top = int(np.argmax(force))
-                    aside = length[top] > 0.8 * length.max()
-                    loops.annotate(
-                        ", ".join(dict.fromkeys(_labelled(key, row) for key in varied)),
-                        (100.0 * (length.max() if aside else length[top]), force[top]), (3, 0) if aside else (0, 2),
-                        textcoords="offset points", ha="left" if aside else "center",
-                        va="center" if aside else "bottom", fontsize=6.5,
-                    )  # fmt: skip
-                x, net = each.curves[f"net work {k}"]
-                cycles.plot(x, 1e3 * net, **{**look.trace, "label": "_"}, marker=look.points["marker"], markersize=2.5)
-            errors = each.errors("power_f0_l0_per_s")
-            power.errorbar(
-                _VARIED[across][1] * each.column(across), 1e3 * each.column("power_f0_l0_per_s"), 1e3 * errors,
-                **look.points, elinewidth=0.8,
-            )  # fmt: skip
-        power.axhline(0.0, color="black", linewidth=0.6)
-        cycles.axhline(0.0, color="black", linewidth=0.6)
-        loops.margins(x=0.12)
-        cycles.xaxis.get_major_locator().set_params(integer=True)
-        loops.set(xlabel="length change (% L$_0$)", ylabel="force (F$_0$)")
-        power.set(xlabel=_VARIED[across][0], ylabel="power (10$^{-3}$ F$_0$·L$_0$/s)")
-        cycles.set(xlabel="cycle", ylabel="net work (10$^{-3}$ F$_0$·L$_0$)")
-        power.margins(y=0.2)
-        legend(power)
-        lettered([loops, power, cycles])
+        draw(figure, found)
 
 
 def _still_noise(run: Run, cycles: list[Array]) -> ForceNoise | None:
@@ -236,25 +195,6 @@ def _still_noise(run: Run, cycles: list[Array]) -> ForceNoise | None:
     before = float(run.time_s[0]), float(cycles[0][0])
     after = float(cycles[-1][-1]), float(run.time_s[-1])
     return noise_between(run.trial, *max(before, after, key=lambda part: part[1] - part[0]))
-
-
-def _varied(found: Found) -> list[str]:
-    """What differs among the trials, of `_VARIED`; the frequency where nothing does."""
-    keys = []
-    for key in _VARIED:
-        values = found.column(key)
-        known = values[np.isfinite(values)]
-        # Amplitudes are read off samples.
-        if known.size and (known.size < values.size or np.ptp(known) > 0.01 * np.max(np.abs(known))):
-            keys.append(key)
-    return keys or ["frequency_hz"]
-
-
-def _labelled(key: str, row: Mapping[str, Cell]) -> str:
-    """A trial's number by which its loop is known from others."""
-    value = row.get(key)
-    _, factor, unit = _VARIED[key]
-    return f"{factor * value:.3g}{unit}" if isinstance(value, float) else "constant Ca"
 
 
 def _cycles(run: Run) -> tuple[list[Array], list[str]]:
@@ -335,12 +275,3 @@ def _numbers(rows: Sequence[Mapping[str, Cell]]) -> Mapping[str, Number]:
         "power_f0_l0_per_s": Number(power.value, power.se, why="largest of the trials"),
         "frequency_hz": Number(frequency if isinstance(frequency, float) else None),
     }
-
-
-def _arrows(axis: Any, x: Array, y: Array, colour: str) -> None:
-    """Two arrows along a loop."""
-    for share in (0.05, 0.4):
-        k = int(share * x.size)
-        ahead = min(k + max(2, x.size // 40), x.size - 1)
-        arrow = {"arrowstyle": "-|>", "color": colour, "linewidth": 0.9, "shrinkA": 0.0, "shrinkB": 0.0}
-        axis.annotate("", (x[ahead], y[ahead]), (x[k], y[k]), arrowprops=arrow)

@@ -55,7 +55,7 @@ def demo(recordings: Path | None, out: Path, live: bool, timing: Timing) -> int:
     if live and importlib.util.find_spec("rclpy") is None:
         print("\nROS 2 is not installed here (rclpy): the part through muscle_node is left out")
     elif live:
-        from xb_muscle_ros.node.client.player import play_live
+        from xb_muscle_ros.node.client.live import play_live
         from xb_muscle_ros.node.client.process import NodeProcess, private_domain
 
         domain = private_domain()

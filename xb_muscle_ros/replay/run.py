@@ -20,7 +20,7 @@ from xb_muscle_ros.trials.simulated import Simulated
 from xb_muscle_ros.trials.trial import Trial
 
 Player = Callable[[Sequence[Trial], Fibre], Sequence[Simulated]]
-"""Plays trials through a running node: `node.client.player.play_live`, or that with its options filled in."""
+"""Plays trials through a running node: `node.client.live.play_live`, or that with its options filled in."""
 
 
 @dataclass(frozen=True)

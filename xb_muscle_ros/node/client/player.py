@@ -1,4 +1,4 @@
-"""Plays trials through a running muscle node over DDS and records what it answers."""
+"""Plays trials through a running muscle node over DDS and keeps what it answers."""
 
 # mypy: allow-untyped-calls
 
@@ -6,8 +6,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,11 +15,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.duration import Duration
 
 from xb_muscle_ros.errors import DataWarning, UserError
-from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.node.client.link import Link
 from xb_muscle_ros.node.client.travelling import Plan
 from xb_muscle_ros.node.client.wires import LoadSender, Sender, reliable
-from xb_muscle_ros.node.configuration import flat
 from xb_muscle_ros.node.diagnostics import fault_in, status_name
 from xb_muscle_ros.node.joint_state import Joints
 from xb_muscle_ros.node.traffic import subscribe
@@ -30,7 +27,6 @@ from xb_muscle_ros.trials.trial import Trial
 # Samples under way at once. Well below the depth of the queues, so that nothing is ever lost.
 _WINDOW = 20
 _HANDSHAKE_S = 1.0
-_FIND_S = 10.0
 _LOOK_EVERY_S = 0.2
 _LEAVE_S = 2.0
 # What the node tells of itself counts where it is so much younger than its last answer, s; it tells it once a second.
@@ -39,95 +35,6 @@ _NEWER_S = 0.3
 
 class Stopped(UserError):
     """The node's fibre stopped at a trial; after a reset it may play others."""
-
-
-def play_live(
-    trials: Sequence[Trial],
-    fibre: Fibre | None = None,
-    timeout_s: float = 10.0,
-    find_s: float = _FIND_S,
-    namespace: str = "",
-    domain_id: int | None = None,
-) -> list[Simulated]:
-    """Play trials one after the other through the muscle node of a namespace, which is in lockstep.
-
-    Every trial starts from a reset with the trial's own constants; calcium is delivered before the length that needs
-    it, so that the forces are those of an offline replay, bit for bit.
-
-    Args:
-        trials: all of the node's fibre.
-        fibre: parameters that the node must have; None leaves them to the node.
-        timeout_s: longest wait for one answer, s.
-        find_s: longest wait for the node to appear, s.
-        namespace: of the node.
-        domain_id: of ROS; None stands for that of the environment.
-
-    Returns:
-        One result per trial, in order.
-
-    Raises:
-        UserError: no node, not the right one, a refused parameter, or no answer.
-    """
-    if not trials:
-        return []
-    with playing(trials, fibre, timeout_s, find_s, namespace, domain_id) as player:
-        return [player.play(trial) for trial in trials]
-
-
-@contextmanager
-def playing(
-    trials: Sequence[Trial],
-    fibre: Fibre | None = None,
-    timeout_s: float = 10.0,
-    find_s: float = _FIND_S,
-    namespace: str = "",
-    domain_id: int | None = None,
-    topic: str = "length",
-) -> Iterator[Player]:
-    """A player for trials, which has met the node.
-
-    Args:
-        trials: one at least; those that will be played.
-        fibre, timeout_s, find_s, namespace, domain_id: see `play_live`.
-        topic: what the node hears: ``length``, or ``load`` under force control.
-
-    Raises:
-        UserError: see `play_live`.
-    """
-    with Link("muscle_player", namespace, domain_id) as link:
-        yield _met(link, trials, fibre, (timeout_s, find_s), topic)
-
-
-def _met(
-    link: Link, trials: Sequence[Trial], fibre: Fibre | None, patience_s: tuple[float, float], topic: str
-) -> Player:
-    """A player and the node that it needs, which know each other."""
-    timeout_s, find_s = patience_s
-    name = trials[0].facts.fibre
-    model = f" -p model:={fibre.model}" if fibre is not None else ""
-    given = str(fibre.path) if fibre is not None and fibre.path is not None else name
-    control = " -p control:=force" if topic == "load" else ""
-    command = f"muscle_node --ros-args -p fiber_file:={given}{model} -p mode:=lockstep{control}"
-    player = Player(link, name, timeout_s, topic)
-    link.find(find_s, command)
-    _check(link, trials, fibre, command, "force" if topic == "load" else "length")
-    player.meet(find_s)
-    return player
-
-
-def _check(link: Link, trials: Sequence[Trial], fibre: Fibre | None, command: str, control: str) -> None:
-    link.check_active()
-    wanted: dict[str, object] = {"mode": "lockstep", "control": control}
-    if fibre is not None:
-        wanted |= {n: v for n, v in flat(fibre).items() if not n.startswith(("source", "constants."))}
-    fibre_there = link.parameters(["fibre"])["fibre"]
-    for trial in trials:
-        if trial.facts.fibre != fibre_there:
-            raise UserError(
-                f"node {link.peer} has fibre {fibre_there}, trial {trial.facts.trial} is of fibre "
-                f"{trial.facts.fibre}; end the node and start another: {command}"
-            )
-    link.check(wanted, command)
 
 
 class Player:
@@ -193,7 +100,7 @@ class Player:
 
         Raises:
             Stopped: the node's fibre stopped; with its reason.
-            UserError: see `play_live`.
+            UserError: see `live.play_live`.
         """
         if shares is not None:
             self._shares = shares
