@@ -45,6 +45,24 @@ def test_the_first_and_the_last_cycle_between_still_lengths_count() -> None:
     assert found.frequency_hz == pytest.approx(4.0, rel=1e-3)
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("frequency", [4.0, 21.3])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_two_cycles_between_still_lengths_are_found(frequency: float, sign: float, noise: float) -> None:
+    """Regression: length rises once from a shortest to a longest length, and no cycle was found."""
+    inside = (TIME_S > 1.0) & (1.0 + 2.0 / frequency > TIME_S)
+    scatter = noise * np.random.default_rng(5).standard_normal(TIME_S.size)
+    length = 0.01 * (np.where(inside, sign * np.sin(2.0 * np.pi * frequency * (TIME_S - 1.0)), 0.0) + scatter)
+    ((start_s, seen),) = oscillations(TIME_S, length)
+    assert seen == pytest.approx(frequency, rel=0.01)
+    assert start_s == pytest.approx(1.0 + np.arange(3) / frequency, abs=0.01 / frequency + 1e-3)
+
+
+def test_two_stretches_are_no_cycles() -> None:
+    length = np.interp(TIME_S, [0.0, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6], [0, 0, 0.04, 0, 0, 0.04, 0.01, 0])
+    assert oscillations(TIME_S, length) == []
+
+
 def test_a_cycle_of_twice_the_frequency_is_none_of_the_slower_ones() -> None:
     faster = TIME_S >= 2.0
     length = 0.01 * np.sin(2.0 * np.pi * np.where(faster, 4.0, 2.0) * TIME_S)

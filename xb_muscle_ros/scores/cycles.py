@@ -31,7 +31,8 @@ class Oscillation(NamedTuple):
     """Consecutive cycles of one frequency and amplitude.
 
     Attributes:
-        start_s: begin of each cycle and end of the last, where length rises through its middle, shape (cycles + 1,), s.
+        start_s: begin of each cycle and end of the last, where length rises through its middle, or where it falls
+            through it if more cycles are whole in that way, shape (cycles + 1,), s.
         frequency_hz: that of the sinusoid that fits length best over the cycles.
     """
 
@@ -83,7 +84,16 @@ def oscillations(time_s: Array, length_l0: Array) -> list[Oscillation]:
     Args:
         time_s, length_l0: shape (n,), s and L0; amplitudes below a quarter of the largest are not seen.
     """
+    # Length that first falls has as many whole cycles from fall to fall as one that first rises from rise to rise.
+    ways = [_from_rises(time_s, sign * length_l0) for sign in (1.0, -1.0)]
+    return max(ways, key=lambda found: sum(one.cycles for one in found))
+
+
+def _from_rises(time_s: Array, length_l0: Array) -> list[Oscillation]:
+    """Those of which each cycle begins with a rise."""
     times, by = rises(time_s, length_l0)
+    if times.size == 1:
+        return _about(time_s, length_l0, float(times[0]), float(by[0]))
     periods = np.diff(times)
     found, k = [], 0
     while k < periods.size:
@@ -96,6 +106,18 @@ def oscillations(time_s: Array, length_l0: Array) -> list[Oscillation]:
             found.append(Oscillation(starts, best_frequency(time_s, length_l0, starts)))
         k = max(end, k + 1)
     return found
+
+
+def _about(time_s: Array, length_l0: Array, rise_s: float, by_l0: float) -> list[Oscillation]:
+    """The two cycles about the only rise of a record, between still lengths; their period is that of the turns."""
+    low, high = (time_s[each] for each in turns(length_l0))
+    if low.size != _FEWEST or high.size != _FEWEST or not _alike(np.ptp(low), np.ptp(high), _PERIOD):
+        return []
+    period_s = 0.5 * float(np.ptp(low) + np.ptp(high))
+    # Samples tell turns less closely than a sinusoid through both cycles does.
+    period_s = 1.0 / best_frequency(time_s, length_l0, rise_s + period_s * np.array([-1.0, 0.0, 1.0]))
+    start_s = _extended(time_s, length_l0, rise_s + period_s * np.array([0.0, 1.0]), by_l0)
+    return [Oscillation(start_s, 1.0 / period_s)] if start_s.size == _FEWEST + 1 and start_s[1] == rise_s else []
 
 
 def _extended(time_s: Array, length_l0: Array, start_s: Array, by_l0: float) -> Array:
