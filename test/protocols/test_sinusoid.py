@@ -121,6 +121,33 @@ def test_a_record_of_several_frequencies_without_settings() -> None:
     assert any("found from length: 1.5" in line and "first cycle" in line for line in told), told
 
 
+def test_errors_of_one_frequency_do_not_depend_on_others_in_the_record() -> None:
+    """Regression: small oscillations passed for isometric, and their force for noise: errors were 40 times as large."""
+
+    def record(*frequencies: float) -> Trial:
+        begins, end = [], 0.6
+        for frequency in frequencies:
+            begins.append(end)
+            end += 6.0 / frequency + 0.3
+        time = np.arange(0.0, end + 0.2, 5e-4)
+        length, force = np.zeros(time.size), np.full(time.size, 0.8)
+        for begin, frequency in zip(begins, frequencies, strict=True):
+            inside = (time >= begin) & (time <= begin + 6.0 / frequency)
+            angle = 2.0 * np.pi * frequency * (time[inside] - begin)
+            length[inside] += 0.001 * np.sin(angle)
+            force[inside] += 0.001 * (20.0 * np.sin(angle) + 8.0 * np.cos(angle))
+        force += 0.002 * np.random.default_rng(3).standard_normal(time.size)
+        return xb.make_trial("m", "sweep", time, length, 10.0**1.5, force, tell=lambda line: None)
+
+    alone, among = (
+        xb.analyse_protocol("sinusoid", [record(*f)], tell=lambda line: None).results[0]
+        for f in ((1.0,), (1.0, 5.0, 20.0))
+    )
+    for key, truth in (("elastic_f0_per_l0", 20.0), ("viscous_f0_per_l0", 8.0)):
+        assert among.errors(key)[0] == pytest.approx(alone.errors(key)[0], rel=0.5)
+        assert np.all(np.abs(among.column(key) - truth) < 4.0 * among.errors(key))
+
+
 def test_a_force_that_is_not_linear_is_told() -> None:
     trials = []
     for trial in plan(pca=4.5, frequency=[1.0, 2.0, 4.0]):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from xb_muscle_ros.protocols.base import settings_of
 from xb_muscle_ros.protocols.registry import PROTOCOLS
-from xb_muscle_ros.scores.complex_stiffness import ComplexStiffness, complex_stiffness
+from xb_muscle_ros.scores.complex_stiffness import ComplexStiffness, Trace, complex_stiffness
 from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.scores.standard_error import force_noise
 
@@ -29,7 +29,7 @@ def made(frequency: float, elastic: float, viscous: float, second: float = 0.0) 
 def test_a_spring_and_a_dashpot_beside_drift_come_out(f: float, elastic: float, viscous: float, second: float) -> None:
     size = abs(complex(elastic, viscous))
     length, force = made(f, elastic, viscous, second)
-    found = complex_stiffness(TIME_S, length, force, f)
+    found = complex_stiffness(Trace(TIME_S, length), Trace(TIME_S, force), f)
     assert isinstance(found, ComplexStiffness)
     assert found.value == pytest.approx(complex(elastic, viscous), abs=1e-7 * (1.0 + size))
     assert found.amplitude_l0 == pytest.approx(0.00125)
@@ -39,13 +39,39 @@ def test_a_spring_and_a_dashpot_beside_drift_come_out(f: float, elastic: float, 
         assert found.magnitude.value * turned == pytest.approx(complex(elastic, viscous), abs=1e-6 * size)
 
 
+@pytest.mark.parametrize(("rate", "late"), [(1000.0, 5e-4), (1000.0, 0.0), (500.0, 1.3e-4), (2000.0, 1e-4)])
+@pytest.mark.parametrize("frequency", [2.0, 100.0])
+def test_length_and_force_have_times_of_their_own(frequency: float, rate: float, late: float) -> None:
+    """Regression: length was read between its samples, which took up to a fifth of its amplitude."""
+    length_s = np.arange(int(1.5 * rate)) / rate
+    force_s = np.arange(0, 1400) * 1e-3 + late
+
+    def at(t: np.ndarray, sine: float, cosine: float) -> np.ndarray:
+        angle = 2.0 * np.pi * frequency * t
+        return 0.002 * (sine * np.sin(angle) + cosine * np.cos(angle))
+
+    force = 0.8 + at(force_s, 20.0, 8.0) + 1e-6 * np.random.default_rng(1).standard_normal(force_s.size)
+    found = complex_stiffness(Trace(length_s, at(length_s, 1.0, 0.0)), Trace(force_s, force), frequency, measured=True)
+    assert isinstance(found, ComplexStiffness)
+    assert found.value == pytest.approx(20.0 + 8.0j, abs=1e-3)
+    assert found.from_scatter is (frequency == 100.0)
+    if found.from_scatter:
+        assert abs(found.elastic.value - 20.0) < 4.0 * found.elastic.se < 1e-3
+
+
 def test_too_little_is_told() -> None:
     length, force = made(0.2, 10.0, 5.0)
-    for time, frequency, why in ((TIME_S, 0.2, "0.60 of a cycle"), (TIME_S, 400.0, "2.5 samples for each cycle")):
-        found = complex_stiffness(time, length, force, frequency)
+    whole = Trace(TIME_S, length)
+    for length_, frequency, why in (
+        (whole, 0.2, "0.60 of a cycle"),
+        (whole, 400.0, "2.5 samples of force for each cycle"),
+        (Trace(TIME_S[::50], length[::50]), 10.0, "2 samples of length for each cycle"),
+        (Trace(TIME_S[:1], length[:1]), 10.0, "there is no stiffness in 1 sample of length"),
+    ):
+        found = complex_stiffness(length_, Trace(TIME_S, force), frequency)
         assert isinstance(found, Missing)
         assert why in found.why
-    assert isinstance(complex_stiffness(TIME_S, 0.0 * length, force, 2.0), Missing)
+    assert isinstance(complex_stiffness(Trace(TIME_S, 0.0 * length), Trace(TIME_S, force), 2.0), Missing)
 
 
 @pytest.mark.parametrize(
@@ -71,9 +97,8 @@ def test_standard_errors_are_those_of_repeated_noise(slow: float, cycles: int, q
         force[still] += 0.5 - clean[still]
         recorded = replace(trial, force_time_s=trial.time_s, force_n=force)
         known = force_noise(recorded) if quiet else None
-        found = complex_stiffness(
-            trial.time_s[inside], trial.length_change_l0[inside], force[inside], 10.0, known, measured=True
-        )
+        length = Trace(trial.time_s[inside], trial.length_change_l0[inside])
+        found = complex_stiffness(length, Trace(trial.time_s[inside], force[inside]), 10.0, known, measured=True)
         assert isinstance(found, ComplexStiffness)
         assert found.from_scatter is (cycles > 3)
         values.append([found.elastic.value, found.viscous.value, found.magnitude.value, found.phase_deg.value])

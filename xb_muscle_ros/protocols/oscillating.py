@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from xb_muscle_ros.protocols.base import Planned, Run
 from xb_muscle_ros.protocols.inputs import calcium_um, facts_of, sample_times
 from xb_muscle_ros.scores.cycles import oscillations
+from xb_muscle_ros.scores.standard_error import ForceNoise, noise_outside
 from xb_muscle_ros.trials.trial import Array, Phase, Trial
 
 NAME = "sinusoid"
@@ -74,15 +76,29 @@ def with_corners(trial: Trial) -> Planned:
     return Planned(trial, trial.time_s, trial.length_change_l0)
 
 
-def windows_of(run: Run) -> tuple[list[tuple[float, float, float]], list[str]]:
-    """Frequency (Hz), begin and end (s) of what is read, and what is said about it."""
+class Windows(NamedTuple):
+    """What is read of a trial.
+
+    Attributes:
+        each: frequency (Hz), begin and end (s).
+        told: what is said about it, one line each.
+        noise: of a measured force while length is still.
+    """
+
+    each: list[tuple[float, float, float]]
+    told: list[str]
+    noise: ForceNoise | None
+
+
+def windows_of(run: Run) -> Windows:
+    """Where a trial tells that its length oscillates, or where that is seen."""
     trial = run.trial
     frequency, phase = run.setting("frequency_hz"), trial.phases_by_name().get(OSCILLATION)
     if trial.facts.protocol == NAME and frequency is not None and phase is not None:
-        return [(frequency, phase.start_s, phase.end_s)], []
+        return Windows([(frequency, phase.start_s, phase.end_s)], [], run.noise)
     seen = oscillations(trial.time_s, trial.length_change_l0)
     if not seen:
-        return [], ["length does not oscillate for two cycles or more"]
+        return Windows([], ["length does not oscillate for two cycles or more"], None)
     windows, told = [], []
     for one in seen:
         skipped = 1 if one.cycles > 2 else 0
@@ -92,4 +108,7 @@ def windows_of(run: Run) -> tuple[list[tuple[float, float, float]], list[str]]:
     onset = "the first cycle of each is left out" if all(one.cycles > 2 for one in seen) else (
         "the first cycle is left out where there are three or more"
     )  # fmt: skip
-    return windows, [f"found from length: {'; '.join(told)}; {onset}"]
+    # Small oscillations pass for isometric where phases are sought.
+    moving = [(float(one.start_s[0]), float(one.start_s[-1])) for one in seen]
+    noise = None if run.simulated is not None else noise_outside(trial, moving)
+    return Windows(windows, [f"found from length: {'; '.join(told)}; {onset}"], noise)

@@ -14,7 +14,7 @@ from xb_muscle_ros.protocols.base import Cell, Column, Curve, Found, Number, Opt
 from xb_muscle_ros.protocols.figures import legend, lettered, logarithmic, looks, plainly
 from xb_muscle_ros.protocols.inputs import pca_option
 from xb_muscle_ros.protocols.oscillating import NAME, oscillating, windows_of, with_corners
-from xb_muscle_ros.scores.complex_stiffness import ComplexStiffness, complex_stiffness
+from xb_muscle_ros.scores.complex_stiffness import ComplexStiffness, Trace, complex_stiffness
 from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.scores.process_rates import Processes, fit_processes
 from xb_muscle_ros.trials.protocol import Allowed
@@ -86,14 +86,18 @@ class Sinusoid(Protocol):
         found: list[tuple[float | None, ComplexStiffness]] = []
         for run in runs:
             name, pca = run.trial.facts.trial, run.trial.facts.pca
-            windows, told = windows_of(run)
+            windows, told, noise = windows_of(run)
             notes += [f"trial {name}: {line}" for line in told]
             for frequency, begin_s, end_s in windows:
-                inside = (run.time_s >= begin_s - 1e-9) & (run.time_s < end_s - 1e-9)
-                one = complex_stiffness(
-                    run.time_s[inside], run.length_l0[inside], run.force_f0[inside], frequency, run.noise,
-                    run.simulated is None,
-                )  # fmt: skip
+                length, force = (
+                    Trace(time_s[inside], value[inside])
+                    for time_s, value in (
+                        (run.trial.time_s, run.trial.length_change_l0),
+                        (run.time_s, run.force_f0),
+                    )
+                    for inside in [(time_s >= begin_s - 1e-9) & (time_s < end_s - 1e-9)]
+                )
+                one = complex_stiffness(length, force, frequency, noise, run.simulated is None)
                 if isinstance(one, Missing):
                     notes += [line for line in [f"trial {name}: {one.why}"] if line not in notes]
                     continue

@@ -29,7 +29,7 @@ from xb_muscle_ros.protocols.stimulation import stimulated
 from xb_muscle_ros.protocols.work_loop_figure import draw
 from xb_muscle_ros.scores.cycles import oscillations
 from xb_muscle_ros.scores.estimate import Estimate, rounded
-from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN, ForceNoise, noise_between
+from xb_muscle_ros.scores.standard_error import NO_NOISE_KNOWN, noise_outside
 from xb_muscle_ros.scores.work_loop import Work, repeats_from, work_of
 from xb_muscle_ros.trials.protocol import Allowed
 from xb_muscle_ros.trials.trial import Array, Phase
@@ -157,8 +157,10 @@ class WorkLoops(Protocol):
             name = run.trial.facts.trial
             found, told = _cycles(run)
             notes += [f"trial {name}: {line}" for line in told]
+            # Within cycles and between them force only moves.
+            moving = [(float(found[0][0]), float(found[-1][-1]))] if found else []
             for edges in found:
-                noise = None if run.simulated is not None else _still_noise(run, found)
+                noise = None if run.simulated is not None else noise_outside(run.trial, moving)
                 works = [
                     work_of(run.time_s, run.length_l0, run.force_f0, begin, end, noise)
                     for begin, end in itertools.pairwise(edges)
@@ -188,13 +190,6 @@ class WorkLoops(Protocol):
     def draw(self, figure: Any, found: Sequence[Found]) -> None:
         """Last loop of each trial with its direction, power against what varies, net work from cycle to cycle."""
         draw(figure, found)
-
-
-def _still_noise(run: Run, cycles: list[Array]) -> ForceNoise | None:
-    """Noise of force before the first cycle or after the last, whichever is longer: within them force only moves."""
-    before = float(run.time_s[0]), float(cycles[0][0])
-    after = float(cycles[-1][-1]), float(run.time_s[-1])
-    return noise_between(run.trial, *max(before, after, key=lambda part: part[1] - part[0]))
 
 
 def _cycles(run: Run) -> tuple[list[Array], list[str]]:

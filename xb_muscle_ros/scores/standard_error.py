@@ -115,4 +115,17 @@ def noise_between(trial: Trial, from_s: float, to_s: float) -> ForceNoise | None
     return force_noise(part)
 
 
+def noise_outside(trial: Trial, moving_s: Sequence[tuple[float, float]]) -> ForceNoise | None:
+    """Noise of a trial's measured force in the longest time before, between or after those in which length moves.
+
+    Args:
+        moving_s: begin and end of each, s, in order.
+    """
+    if not trial.force_time_s.size:
+        return None
+    ends = [float(trial.force_time_s[0]), *(end for _, end in moving_s)]
+    begins = [*(begin for begin, _ in moving_s), float(trial.force_time_s[-1])]
+    return noise_between(trial, *max(zip(ends, begins, strict=True), key=lambda part: part[1] - part[0]))
+
+
 NO_NOISE_KNOWN = "standard error not known: no quiet time to take the noise from"
