@@ -38,8 +38,8 @@ CYCLES = "cycles"
 _LEAD_S = 0.1
 # Net work may differ by this share of the work turned over where loops repeat.
 _SAME = 0.01
-# Fewer samples to a cycle change net work by more than 2 %.
-_LEAST_SAMPLES = 20.0
+# Fewer samples to a cycle change net work by more than 2 %; for recordings it is said where they change it by 0.4 %.
+_LEAST_SAMPLES, _TOLD_SAMPLES = 20.0, 40.0
 _OF_CYCLE: Mapping[str, Column] = {
     "net_f0_l0": Column("net work", "10⁻³ F0·L0", ".3f", 1e3),
     "shortening_f0_l0": Column("shortening work", "10⁻³ F0·L0", ".3f", 1e3),
@@ -178,7 +178,7 @@ class WorkLoops(Protocol):
                 )
                 cycle = slice(*np.searchsorted(run.time_s, edges[-2:] + np.array([-1e-9, 1e-9])).tolist())
                 curves[f"loop {len(rows)}"] = Curve(run.length_l0[cycle], run.force_f0[cycle])
-                notes += [f"trial {name}: {line}" for line in _remarks(works)]
+                notes += [f"trial {name}: {line}" for line in (*_remarks(works), *_coarse(run, edges))]
         if of == MEASURED and unknown:
             notes.append(f"{NO_NOISE_KNOWN} ({unknown} of {len(rows)})")
         return Found(fibre, of, tuple(rows), _numbers(rows), curves, tuple(runs), tuple(notes), parts=tuple(parts))
@@ -253,6 +253,23 @@ def _remarks(works: list[Work]) -> list[str]:
     if abs(last.left_l0) > _SAME * last.excursion_l0:
         lines.append(f"the last loop does not close: length ends {100.0 * last.left_l0:.3g} % L0 from where it began")
     return lines
+
+
+def _coarse(run: Run, edges: Array) -> list[str]:
+    """What few samples to a cycle do to net work, which is that of straight lines between them."""
+    names = ("length", "force") if run.simulated is None else ("force",)
+    times = {"length": run.trial.time_s, "force": run.time_s}
+    counts = {name: np.ptp(np.searchsorted(times[name], edges[[0, -1]])) / (edges.size - 1) for name in names}
+    name = min(names, key=lambda each: float(counts[each]))
+    count = float(counts[name])
+    if count >= _TOLD_SAMPLES * (1.0 - 1e-6):
+        return []
+    angle = 2.0 * np.pi / count
+    lost = 100.0 * (1.0 - np.sin(angle) / angle) if angle < np.pi else 100.0
+    return [
+        f"{count:.3g} samples of {name} to a cycle: net work is that of straight lines between them, up to {lost:.2g} "
+        f"% too small where length and force are sinusoids; {_TOLD_SAMPLES:g} make it less than half a percent"
+    ]
 
 
 def _numbers(rows: Sequence[Mapping[str, Cell]]) -> Mapping[str, Number]:

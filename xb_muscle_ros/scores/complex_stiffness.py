@@ -1,7 +1,7 @@
 """Complex stiffness at one frequency: force over length, by least squares of sine and cosine.
 
 Force and length are fitted at their own samples by the same columns: cosine and sine of the frequency and of its second
-harmonic, a level and a line for drift. A length that were read between its samples would lose amplitude. Any length of
+harmonic, a level and a line for drift. Length read between its samples would lose amplitude. Any length of
 record counts, whole cycles or not, and a length that is not a pure sinusoid enters by the coefficient that it has.
 Their quotient is the elastic modulus (real part) and the viscous modulus (imaginary part). From six cycles on their
 standard errors come from the scatter among single cycles: what counts is noise at this frequency, which a shorter quiet
