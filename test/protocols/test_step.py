@@ -136,3 +136,52 @@ def test_force_that_is_gone_with_the_movement_is_told(model: str, viscous: bool)
     told: list[str] = []
     xb.run_protocol("step", "18Dec2017a", model=model, size=[-0.001, 0.001], tell=told.append)
     assert any("that is viscosity, not stiffness" in line for line in told) == viscous
+
+
+def measured(size: float, lag_s: float, of_force: float, of_length: float, random: np.random.Generator) -> Trial:
+    """A step in 0.2 ms after a second; force, whose channel lags, has stiffness 100 F0/L0 and T2 at 30 % of T1."""
+    time = np.arange(0.0, 1.1, 1.0 / 20000.0)
+    since = time - lag_s - 1.0002
+    after = 70.0 * np.exp(-800.0 * np.maximum(since, 0.0)) + 30.0 * np.exp(-20.0 * np.maximum(since, 0.0))
+    force = 1.0 + size * np.where(since < 0.0, 100.0 * np.clip((since + 2e-4) / 2e-4, 0.0, 1.0), after)
+    length = np.interp(time, [1.0, 1.0002], [0.0, size]) + of_length * random.standard_normal(time.size)
+    noisy = force + of_force * random.standard_normal(time.size)
+    return xb.make_trial("m", f"s{1e4 * size:+.0f}", time, length, 10.0**1.5, noisy, tell=lambda line: None)
+
+
+@pytest.mark.parametrize(
+    ("lag_s", "of_force", "of_length", "told"),
+    [(0.0, 1e-3, 0.0, ""), (5e-5, 1e-3, 0.0, "0.05 ms after"), (2e-4, 1e-3, 0.0, "0.2 ms after"),
+     (0.0, 1e-2, 0.0, ""), (0.0, 1e-3, 1e-4, None)],
+)  # fmt: skip
+def test_force_that_lags_and_noise_of_length_do_not_hide_t1(
+    lag_s: float, of_force: float, of_length: float, told: str | None
+) -> None:
+    """Regression: T1 was force at the end of the length step: a lag of one sample took a quarter of the stiffness."""
+    random, sizes = np.random.default_rng(0), (-0.005, -0.0025, -0.001, 0.001, 0.0025)
+    trials = [measured(size, lag_s, of_force, of_length, random) for size in sizes]
+    lines: list[str] = []
+    (found,) = xb.analyse_protocol("step", trials, tell=lines.append).results
+    for key, truth in (("stiffness_f0_per_l0", 100.0), ("y0_l0", 0.01)):
+        number = found.numbers[key]
+        assert abs(number.value - truth) < 4.0 * number.se < 0.15 * truth
+    for key, share in (("t1_f0", 100.0), ("t2_f0", 30.0)):
+        apart = found.column(key) - (1.0 + share * np.array(sizes))
+        assert np.all(np.abs(apart)[:2] < 5.0 * found.errors(key)[:2] + 1e-3 * (told is None))
+    if told is not None:
+        assert [told] * bool(told) == [told for line in lines if "comes to its extreme" in line and told in line]
+
+
+def test_force_that_comes_much_later_has_no_stiffness() -> None:
+    """Regression: a stiffness of 0.16 F0/L0 and a release to zero force of 618 % L0 were given."""
+    random = np.random.default_rng(0)
+    trials = [measured(size, 1e-3, 1e-3, 0.0, random) for size in (-0.0025, -0.001, 0.001, 0.0025)]
+    lines: list[str] = []
+    (found,) = xb.analyse_protocol("step", trials, tell=lines.append).results
+    assert found.numbers == {}
+    assert any("T1 of small steps does not rise with their size (" in line for line in lines), lines
+    # Between the two, force still goes on.
+    trials = [measured(size, 6e-4, 1e-3, 0.0, random) for size in (-0.0025, 0.0025)]
+    (found,) = xb.analyse_protocol("step", trials, tell=lines.append).results
+    assert found.rows[0]["t1_f0"].value is None
+    assert any("force still goes on 0.5 ms after the step" in line for line in lines), lines

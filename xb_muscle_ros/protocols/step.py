@@ -12,8 +12,8 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.protocols.base import Cell, Column, Curve, Found, Number, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.figures import legend, lettered, looks
 from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
-from xb_muscle_ros.scores.estimate import Missing, notes_of
-from xb_muscle_ros.scores.quick_recovery import first_after, quick_recovery
+from xb_muscle_ros.scores.estimate import Estimate, Missing, notes_of, rounded
+from xb_muscle_ros.scores.quick_recovery import first_tension, quick_recovery
 from xb_muscle_ros.scores.readout import isometric_force
 from xb_muscle_ros.trials.protocol import ALLOWED, Allowed
 from xb_muscle_ros.trials.trial import Trial
@@ -25,6 +25,10 @@ _LONGEST_S = 0.005
 _SMALL_L0 = 0.003
 # What T1 is read so long after the step is told, s: a quick phase has begun.
 _LATE_S = 1e-4
+# A stiffness is above zero by so many standard errors.
+_SURE = 3.0
+# Length is looked at for so long before and after a step, s; it is still after it within this share of the step.
+_STILL_S, _SETTLED = 1e-3, 0.01
 # Less of the change of force than this is left a sample after the step.
 _GONE = 0.1
 
@@ -145,17 +149,23 @@ def _row(run: Run) -> tuple[Mapping[str, Cell], list[str]]:
     if step is None:
         return row, [f"step: there is no single step that takes {1e3 * _LONGEST_S:g} ms or less"]
     start_s, end_s = step
-    size = run.setting("size_l0")
-    size = _size(run.trial, start_s, end_s) if size is None else size
-    t1 = first_after(run.time_s, run.force_f0, end_s, run.noise)
-    row |= {"size_l0": size, "step_s": end_s - start_s, "t1_f0": t1}
-    first = min(int(np.searchsorted(run.time_s, end_s - 5e-10)), run.time_s.size - 1)
-    late_s = float(run.time_s[first]) - end_s
-    told = [f"T1: it is that of the first sample, {1e3 * late_s:.2g} ms after the step"] if late_s > _LATE_S else []
-    if before.value is not None and t1.value is not None and first + 1 < run.time_s.size:
-        kept, change = float(run.force_f0[first + 1]) - before.value, abs(t1.value - before.value)
-        if abs(kept) < _GONE * change and change > 5.0 * (t1.se or 0.0):
-            told.append("T1: force is gone with the movement; that is viscosity, not stiffness")
+    told_l0 = run.setting("size_l0")
+    found_l0 = _size(run.trial, start_s, end_s) if told_l0 is None else Estimate(told_l0)
+    size = found_l0.value or 0.0
+    t1, sample, lag_s = first_tension(run.time_s, run.force_f0, step, size, run.noise, run.simulated is None)
+    row |= {
+        "size_l0": size if told_l0 is not None or run.simulated is not None else found_l0,
+        "step_s": end_s - start_s,
+        "t1_f0": t1,
+    }
+    told = _of_t1(run, before, t1, sample, end_s)
+    if lag_s:
+        end_s = float(run.time_s[sample])
+        if t1.value is not None:
+            when = f"{1e3 * abs(lag_s):.2g} ms {'after' if lag_s > 0.0 else 'before'}"
+            told.append(
+                f"T1: force comes to its extreme {when} the end of the length step, so T1 and T2 are read from there"
+            )
     window_s = run.setting("window_s") or min(0.05, float(run.time_s[-1]) - end_s)
     found = quick_recovery(run.time_s, run.force_f0, end_s, window_s, size, run.noise)
     if isinstance(found, Missing):
@@ -167,12 +177,38 @@ def _row(run: Run) -> tuple[Mapping[str, Cell], list[str]]:
     }, told
 
 
-def _size(trial: Trial, start_s: float, end_s: float) -> float:
-    """How far length is from where it was, at the first sample after a step, L0."""
+def _of_t1(run: Run, before: Estimate, t1: Estimate, sample: int, end_s: float) -> list[str]:
+    """Why there is no T1, or why it may be off."""
+    if t1.value is None:
+        return [f"T1: {t1.why}"]
+    told = []
+    first = min(int(np.searchsorted(run.time_s, end_s - 5e-10)), run.time_s.size - 1)
+    late_s = float(run.time_s[first]) - end_s
+    if late_s > _LATE_S:
+        told.append(f"T1: it is that of the first sample, {1e3 * late_s:.2g} ms after the step")
+    if before.value is not None and sample + 1 < run.time_s.size:
+        kept, change = float(run.force_f0[sample + 1]) - before.value, abs(t1.value - before.value)
+        if abs(kept) < _GONE * change and change > 5.0 * (t1.se or 0.0):
+            told.append("T1: force is gone with the movement; that is viscosity, not stiffness")
+    return told
+
+
+def _size(trial: Trial, start_s: float, end_s: float) -> Estimate:
+    """How far length is from where it was, at the first sample after a step, L0.
+
+    Where length is still before and after, but for noise, the mean of a millisecond counts on either side.
+    """
     before = max(int(np.searchsorted(trial.time_s, start_s + 5e-10, side="right")) - 1, 0)
     after = min(int(np.searchsorted(trial.time_s, end_s - 5e-10)), trial.time_s.size - 1)
+    begin = int(np.searchsorted(trial.time_s, trial.time_s[before] - _STILL_S - 5e-10))
+    end = int(np.searchsorted(trial.time_s, trial.time_s[after] + _STILL_S + 5e-10, side="right"))
     length = trial.length_change_l0
-    return float(length[after] - length[before])
+    one = float(length[after] - length[before])
+    still, later = length[begin : before + 1], length[after:end]
+    if np.ptp(later) > max(_SETTLED * abs(one), 2.0 * float(np.ptp(still))):
+        return Estimate(one)
+    se = float(np.sqrt(np.var(later) / later.size + np.var(still) / still.size))
+    return Estimate(float(np.mean(later) - np.mean(still)), rounded(se))
 
 
 def _line(found: Found) -> tuple[dict[str, Number], dict[str, Curve], list[str]]:
@@ -182,15 +218,27 @@ def _line(found: Found) -> tuple[dict[str, Number], dict[str, Curve], list[str]]
     small = highest & np.isfinite(t1) & (np.abs(size) <= _SMALL_L0 + 1e-9)
     if np.count_nonzero(small) < 2:
         return {}, {}, [f"stiffness needs two steps of {100.0 * _SMALL_L0:g} % L0 or less at one pCa"]
-    before = found.column("isometric_f0")[small]
-    x, y = (
-        np.append(size[small], 0.0),
-        np.append(t1[small], np.nanmean(before) if np.any(np.isfinite(before)) else np.nan),
+    before, of_before = found.column("isometric_f0")[small], found.errors("isometric_f0")[small]
+    known = np.isfinite(before)
+    x = np.append(size[small], 0.0)[: small.sum() + bool(known.any())]
+    y, errors = t1[small], found.errors("t1_f0")[small]
+    if known.any():
+        y = np.append(y, np.mean(before[known]))
+        errors = np.append(errors, np.sqrt(np.sum(of_before[known] ** 2)) / np.count_nonzero(known))
+    weights = np.linalg.pinv(np.column_stack([x, np.ones(x.size)]))
+    slope, at_zero = (float(value) for value in weights @ y)
+    # An error of a step's size counts by what the line makes of it.
+    of_size = np.zeros(errors.size)
+    of_size[: size[small].size] = np.nan_to_num(found.errors("size_l0")[small])
+    errors = np.hypot(errors, slope * of_size)
+    by_y0 = (weights[1] - at_zero / slope * weights[0]) / slope if slope else weights[1]
+    of_slope, of_y0 = (
+        rounded(float(np.sqrt(np.sum((by * errors) ** 2)))) if np.all(np.isfinite(errors)) else None
+        for by in (weights[0], by_y0)
     )
-    known = np.isfinite(y)
-    slope, at_zero = (float(value) for value in np.polyfit(x[known], y[known], 1))
-    if not slope > 0.0:
-        return {}, {}, [f"T1 of small steps does not rise with their size ({slope:.3g} F0/L0)"]
+    if not slope > _SURE * (of_slope or 0.0):
+        known_to = "" if of_slope is None else f" ± {of_slope:.2g}"
+        return {}, {}, [f"T1 of small steps does not rise with their size ({slope:.3g}{known_to} F0/L0)"]
     line = np.linspace(max(float(np.min(size[highest])), -at_zero / slope), float(np.max(x)), 50)
-    curve = Curve(line, at_zero + slope * line)
-    return {"stiffness_f0_per_l0": Number(slope), "y0_l0": Number(at_zero / slope)}, {"t1": curve}, []
+    numbers = {"stiffness_f0_per_l0": Number(slope, of_slope), "y0_l0": Number(at_zero / slope, of_y0)}
+    return numbers, {"t1": Curve(line, at_zero + slope * line)}, []

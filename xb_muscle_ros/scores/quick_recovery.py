@@ -24,6 +24,9 @@ _STARTS, _SLOW_STARTS = (10.0, 30.0, 100.0), (0.3, 3.0)
 # Slowest and fastest slow phase over one over the window; where it is the slowest, and so no phase, a quick phase is
 # at least so fast.
 _SLOW, _QUICK_ALONE = (0.01, 30.0), 10.0
+# Force may come to T1 so long after length has come to its end, s, or as long as the step takes; it is known to do so
+# where it goes on by so many standard errors of a sample, and by this share of its change.
+_MOST_LAG_S, _SURE_LAG, _LEAST_LAG = 5e-4, 5.0, 0.01
 # The amplitude of a quick phase of a measured force is at least so many standard errors: its rate is not known before.
 _SURE = 4.0
 
@@ -89,11 +92,64 @@ def quick_recovery(
     return QuickRecovery(t2, of_quick_rate, of_slow_rate, t, _curve(t, *found))
 
 
-def first_after(time_s: Array, force_f0: Array, end_s: float, noise: ForceNoise | None = None) -> Estimate:
-    """T1: force of the first sample at the end of a step or after it, F0."""
+class FirstTension(NamedTuple):
+    """T1 of a step.
+
+    Attributes:
+        t1_f0: F0.
+        sample: number of the sample whose force that is.
+        lag_s: how long after the end of the length step that is, where a measured force comes to it at another time;
+            else 0.
+    """
+
+    t1_f0: Estimate
+    sample: int
+    lag_s: float
+
+
+def first_tension(
+    time_s: Array,
+    force_f0: Array,
+    step_s: tuple[float, float],
+    size_l0: float,
+    noise: ForceNoise | None = None,
+    measured: bool = False,
+) -> FirstTension:
+    """T1: force of the first sample at the end of a step or after it.
+
+    A measured force may lag length, by a filter or a channel read later, and noise of length may hide where the step
+    ends. Then T1 is the extreme of force about that time (Ford, Huxley and Simmons 1977).
+
+    Args:
+        time_s, force_f0: shape (n,), s and F0.
+        step_s: begin and end of the length step, s.
+        size_l0: of the step.
+        noise: of a measured force, where that is known.
+        measured: force may lag.
+
+    Returns:
+        without a value where force still goes on when it should have come to its extreme.
+    """
+    start_s, end_s = step_s
     first = min(int(np.searchsorted(time_s, end_s - 5e-10)), time_s.size - 1)
-    se = None if noise is None else noise.of_mean(time_s[first : first + 1])
-    return Estimate(float(force_f0[first]), se)
+    one = None if noise is None else noise.of_mean(time_s[first : first + 1])
+    if not measured:
+        return FirstTension(Estimate(float(force_f0[first]), one), first, 0.0)
+    reach_s = max(end_s - start_s, _MOST_LAG_S)
+    last = max(int(np.searchsorted(time_s, end_s + reach_s + 5e-10, side="right")), first + 1)
+    earliest = min(int(np.searchsorted(time_s, 0.5 * (start_s + end_s))), first)
+    away = np.sign(size_l0) * (force_f0[earliest:last] - force_f0[first])
+    k = earliest + int(np.argmax(away))
+    # Force before the step, of which the last sample may lie within it.
+    begin = max(int(np.searchsorted(time_s, start_s + 5e-10)) - 1, 0)
+    least = max(_SURE_LAG * (one or 0.0), _LEAST_LAG * abs(float(force_f0[k] - force_f0[begin])))
+    if k == first or float(away[k - earliest]) <= least:
+        return FirstTension(Estimate(float(force_f0[first]), one), first, 0.0)
+    lag_s = float(time_s[k]) - end_s
+    if k == last - 1:
+        why = f"force still goes on {1e3 * lag_s:.2g} ms after the step: it lags length by more, or is no stiffness"
+        return FirstTension(Estimate(None, why=why), k, lag_s)
+    return FirstTension(Estimate(float(force_f0[k]), one), k, lag_s)
 
 
 def _fitted(t: Array, force: Array) -> Array | None:
