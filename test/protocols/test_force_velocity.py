@@ -123,6 +123,27 @@ def test_a_recording_without_settings_has_its_clamp_found() -> None:
     assert all(row["shortening_l0_per_s"].se > 0.0 for row in found.rows)
 
 
+def test_an_isometric_hold_after_a_clamp_is_none() -> None:
+    """Regression: the ends of a longer hold differed by noise of length, and it was taken for the clamp."""
+    random, loads = np.random.default_rng(0), np.array([0.05, 0.2, 0.4, 0.6, 0.8])
+    time = np.arange(0.0, 0.85, 1.0 / 5000.0)
+    speeds = 0.5 * (1.0 - loads) / (loads + 0.25)
+    trials = []
+    for load, speed in zip(loads, speeds, strict=True):
+        moved = 0.02 * (1.0 - load) + speed * np.clip(time - 0.2, 0.0, 0.15)
+        length = -1.0 * (time >= 0.2) * moved + 1e-4 * random.standard_normal(time.size)
+        after = 0.95 - (0.95 - load) * np.exp(-8.0 * np.maximum(time - 0.35, 0.0))
+        force = np.where(time < 0.2, 1.0, np.where(time < 0.35, load, after))
+        force = force + 0.003 * random.standard_normal(time.size)
+        trials.append(xb.make_trial("m", f"c{load:g}", time, length, 10.0**1.5, force, tell=lambda line: None))
+    (found,) = xb.analyse_protocol("force-clamp", trials, tell=lambda line: None).results
+    assert found.column("load") == pytest.approx(loads, abs=2e-3)
+    apart = np.abs(found.column("shortening_l0_per_s") - speeds)
+    assert np.all(apart < 5.0 * found.errors("shortening_l0_per_s"))
+    assert np.all(found.column("read_from_s") > 0.2)
+    assert np.all(found.column("read_to_s") < 0.35)
+
+
 def test_a_model_repeats_a_recorded_clamp_under_its_load() -> None:
     trials = [recorded(load, 0.1) for load in (0.3, 0.5, 0.7, 0.8)]
     measured, model = xb.analyse_protocol(

@@ -52,6 +52,8 @@ class ForceClamps(Protocol):
         "held_within_f0": Column("load held within", "F0", ".1e"),
         "shortening_l0_per_s": Column("velocity of shortening", "L0/s", ".4f"),
         **curve.POWER,
+        "read_from_s": Column("read from", "s", ".4g"),
+        "read_to_s": Column("to", "s", ".4g"),
     }
     numbers = curve.NUMBERS
     source = "Hill 1938"
@@ -206,8 +208,10 @@ def _row(run: Run) -> tuple[Mapping[str, Cell], list[str]]:
         begin_s, window_s = third, third
         told.append("velocity: read in the middle third of the clamp")
     begin_s += found.start_s
-    speed = velocity(run.time_s, run.length_l0, begin_s, min(begin_s + window_s, found.end_s))
+    end_s = min(begin_s + window_s, found.end_s)
+    speed = velocity(run.time_s, run.length_l0, begin_s, end_s)
     row |= {"load": found.load_f0 / before.value, "held_within_f0": found.held_within_f0}
+    row |= {"read_from_s": begin_s, "read_to_s": end_s}
     if isinstance(speed, Missing):
         return row, [*told, f"velocity: {speed.why}"]
     noisy = run.simulated is None

@@ -14,6 +14,9 @@ _CLAMPED_F0, _SHORTEST_S = 0.03, 0.01
 # The load is the median over what comes after the first part of a clamp, in which the springs give way.
 _AFTER = 0.2
 _FEWEST = 5
+# Length moves in a time if it goes so far, L0, by so many standard errors, and this share of the farthest that it goes
+# at any one level of force: a hold after the clamp drifts, and noise makes its ends differ.
+_MOVED_L0, _SURE, _FAR = 1e-4, 5.0, 0.1
 
 
 class ClampWindow(NamedTuple):
@@ -91,7 +94,7 @@ def _longest_level(time_s: Array, force_f0: Array, length_l0: Array) -> tuple[fl
     away = np.flatnonzero(np.abs(force_f0 - force_f0[0]) > 2.0 * _CLAMPED_F0)
     if not away.size:
         return None
-    best: tuple[float, float] | None = None
+    found: list[tuple[float, float, float]] = []
     rest = np.arange(int(away[0]), force_f0.size)
     # Levels that come often: a clamp is where a histogram of force is high.
     counts, edges = np.histogram(force_f0[rest], bins=max(int(np.ptp(force_f0[rest]) / (0.5 * _CLAMPED_F0)), 1))
@@ -103,8 +106,15 @@ def _longest_level(time_s: Array, force_f0: Array, length_l0: Array) -> tuple[fl
         begins, ends = np.flatnonzero(near[1:] & ~near[:-1]), np.flatnonzero(~near[1:] & near[:-1])
         for begin, end in zip(begins.tolist(), ends.tolist(), strict=True):
             first, last = int(rest[begin]), int(rest[end - 1])
-            lasts_s = float(time_s[last] - time_s[first])
-            moves = abs(float(length_l0[last] - length_l0[first])) > 1e-4
-            if lasts_s >= _SHORTEST_S and moves and (best is None or lasts_s > best[1] - best[0]):
-                best = (float(time_s[first]), float(time_s[last]))
-    return best
+            start_s, end_s = float(time_s[first]), float(time_s[last])
+            if end_s - start_s < _SHORTEST_S:
+                continue
+            speed = velocity(time_s, length_l0, start_s, end_s)
+            if isinstance(speed, Missing):
+                continue
+            by = abs(speed.value) * (end_s - start_s)
+            if by > max(_MOVED_L0, _SURE * speed.se * (end_s - start_s)):
+                found.append((start_s, end_s, by))
+    farthest = max((by for _, _, by in found), default=0.0)
+    moving = [(start_s, end_s) for start_s, end_s, by in found if by >= _FAR * farthest]
+    return max(moving, key=lambda one: one[1] - one[0], default=None)
