@@ -148,6 +148,16 @@ def test_errors_of_one_frequency_do_not_depend_on_others_in_the_record() -> None
         assert np.all(np.abs(among.column(key) - truth) < 4.0 * among.errors(key))
 
 
+@pytest.mark.parametrize(("rate", "is_told"), [(100.0, True), (400.0, False)])
+def test_a_model_that_repeats_a_coarse_length_is_told_of(rate: float, is_told: bool) -> None:
+    time = np.arange(0.0, 2.0, 1.0 / rate)
+    wave = 0.001 * np.sin(2.0 * np.pi * 10.0 * np.maximum(time - 0.5, 0.0))
+    trial = xb.make_trial("18Dec2017a", "coarse", time, wave, 10.0**1.5, 0.8 + 20.0 * wave, tell=lambda line: None)
+    told: list[str] = []
+    xb.analyse_protocol("sinusoid", [trial], model="2state", fibre="18Dec2017a", tell=told.append)
+    assert any("10 samples of length to a cycle of 10 Hz" in line and "by 3.2 %" in line for line in told) == is_told
+
+
 def test_a_force_that_is_not_linear_is_told() -> None:
     trials = []
     for trial in plan(pca=4.5, frequency=[1.0, 2.0, 4.0]):

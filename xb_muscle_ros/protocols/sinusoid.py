@@ -23,6 +23,8 @@ from xb_muscle_ros.trials.trial import Trial
 FREQUENCIES_HZ = tuple(float(f"{frequency:.4g}") for frequency in np.geomspace(0.1, 250.0, 30))
 # Moduli are good to this share of themselves, noise aside: length is a sinusoid to that.
 _GOOD_TO = 1e-3
+# Samples to a cycle from which on straight lines between them take less than 1 % of an amplitude.
+_SMOOTH = 20.0
 # A second harmonic of force above this share of the first is told.
 _LINEAR = 0.05
 _LETTERS = "abc"
@@ -101,6 +103,8 @@ class Sinusoid(Protocol):
                 if isinstance(one, Missing):
                     notes += [line for line in [f"trial {name}: {one.why}"] if line not in notes]
                     continue
+                if run.simulated is not None and told:
+                    notes += [f"trial {name}: {line}" for line in _straight(length, one)]
                 found.append((pca, one))
                 rows.append({"trial": name, "pca": pca, **_row(one)})
         notes += _remarks(found, any(run.simulated is None for run in runs))
@@ -187,6 +191,18 @@ def _row(one: ComplexStiffness) -> Mapping[str, Cell]:
         "second_harmonic": one.second,
         "cycles": one.cycles,
     }
+
+
+def _straight(length: Trace, one: ComplexStiffness) -> list[str]:
+    """What few samples of a recorded length do to a model, which goes straight from one to the next."""
+    count = length.time_s.size / one.cycles
+    if count >= _SMOOTH:
+        return []
+    lost = 100.0 * (1.0 - float(np.sinc(1.0 / count)) ** 2)
+    return [
+        f"{count:.3g} samples of length to a cycle of {one.frequency_hz:.4g} Hz, and a model's length is straight "
+        f"between them: its moduli may be off by {lost:.2g} %"
+    ]
 
 
 def _remarks(found: Sequence[tuple[float | None, ComplexStiffness]], measured: bool) -> list[str]:
