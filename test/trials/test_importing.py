@@ -239,6 +239,26 @@ def test_bags_with_points_in_their_names_stay_apart(tmp_path: Path, trial: Trial
     assert [event.trial.facts.pca for event in made] == [6.0, 6.2]
 
 
+@pytest.mark.parametrize(
+    ("mapping", "options", "pca", "told"),
+    [({}, {"pca": 6.1}, 6.1, "pca is 6.1, as the option gives it; the file's name tells 4.5"),
+     ({"pca": 6.1}, {}, 4.5, "pca is 4.5, as the file's name tells by file_name.pattern; the mapping's 6.1 is for"),
+     ({"pca": 4.5}, {}, 4.5, "")],
+)  # fmt: skip
+def test_pca_of_an_option_goes_before_that_of_a_name(
+    tmp_path: Path, trial: Trial, mapping: dict[str, float], options: dict[str, float], pca: float, told: str
+) -> None:
+    """Regression: the name's was taken without a word."""
+    write_trial(tmp_path / "raw" / "sss_pCa4.5", trial)
+    name = {"pattern": r"pCa(?P<pca>[\d.]+)$"}
+    tree = {"fibre": "f", "file_name": name, "reference_length": "0.5717 mm", **mapping}
+    settings = ImportSettings(tree, "here", overrides=options)
+    events = list(import_recordings(find_recordings([tmp_path / "raw"]), settings, tmp_path / "bags"))
+    (made,) = (event.trial for event in events if isinstance(event, Imported))
+    assert made.facts.pca == pca
+    assert [told] * bool(told) == [told for line in made.warnings if "as the" in line and told in line]
+
+
 def test_trials_that_would_have_one_name_are_named(tmp_path: Path) -> None:
     events = _run([_file(tmp_path / name) for name in ("a 1.csv", "a_1.csv", "a_1")], tmp_path / "bags")
     assert _kinds(events) == ["Imported", "Failed", "Failed"]

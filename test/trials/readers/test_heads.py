@@ -109,6 +109,15 @@ def test_the_line_of_the_header_may_be_told(tmp_path: Path) -> None:
         lab.run(lab.write(tmp_path, lines, "c.csv"), header="top")
 
 
+def test_an_empty_cell_between_blanks_is_refused(tmp_path: Path) -> None:
+    """Regression: the cells behind it moved to its place, and a column that is not imported became the force."""
+    values = zip(lab.TIME_S.tolist(), lab.LENGTH_MM.tolist(), lab.FORCE_MN.tolist(), strict=True)
+    lines = [f"{t:8.3f} {x:9.6f} {f:9.6f} {1.2 * f:9.6f}" for t, x, f in values]
+    lines[50:60] = [line[:18] + " " * 10 + line[28:] for line in lines[50:60]]
+    why = lab.refusal(lab.write(tmp_path, ["time_s length_mm force_mN raw", *lines]))
+    assert "line 52 has 3 cells between blanks, and so do 9 more; needed are 4: time_s, length_mm, force_mN, raw" in why
+
+
 def test_columns_between_blanks(tmp_path: Path) -> None:
     lines = ["Time (s)   Length [mm]  Force", *lab.rows(delimiter="   ")]
     columns = {**unitless("Time (s)", "Length [mm]", "Force"), "force": {"column": "Force", "unit": "mN"}}
@@ -243,11 +252,25 @@ def test_labchart_interval_stands_for_time(tmp_path: Path) -> None:
         lab.run(other, columns)
 
 
+def test_labchart_without_its_column_of_time(tmp_path: Path) -> None:
+    """Regression: every channel had the name of the one after it."""
+    columns = {key: spec for key, spec in unitless("", "Length", "Force").items() if key != "time"}
+    rows = [line.split("\t", 1)[1] for line in lab.rows(delimiter="\t")]
+    noted = [rows[0] + "\t#1 stimulus", *rows[1:]]
+    for name, lines in (("a", labchart(rows)), ("b", labchart(noted)), ("c", labchart(noted, rows))):
+        for trial in lab.trials(lab.write(tmp_path / name, lines, f"{name}.txt"), columns):
+            lab.same(trial)
+    mixed = lab.write(tmp_path / "mixed", labchart(rows, lab.rows(delimiter="\t")))
+    assert "LabChart blocks have different columns: Length, Force, then Time, Length, Force" in lab.refusal(
+        mixed, columns
+    )
+
+
 def test_labchart_blocks_of_other_channels_are_refused(tmp_path: Path) -> None:
     lines = labchart(lab.rows(delimiter="\t"))
     other = [line.replace("ChannelTitle=\tLength", "ChannelTitle=\tSL") for line in lines]
     why = lab.refusal(lab.write(tmp_path / "other", [*lines, *other]), unitless("Time", "Length", "Force"))
-    assert "LabChart blocks have different channels: Length, Force, then SL, Force" in why
+    assert "LabChart blocks have different columns: Time, Length, Force, then Time, SL, Force" in why
 
 
 def labview(*segments: list[str], x_columns: str = "One", delta: str = "0.001", decimal: str = ".") -> list[str]:

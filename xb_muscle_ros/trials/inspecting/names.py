@@ -7,8 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from xb_muscle_ros.trials.readers.calcium import PCA_RANGE
 from xb_muscle_ros.trials.readers.description import name_of
+
+# Others are no trial's: 10 without its point is pCa 10 and not 1.
+_USUAL_PCA = (3.0, 12.0)
 
 
 class NamePattern(NamedTuple):
@@ -26,8 +28,10 @@ _PATTERNS: tuple[tuple[str, dict[str, float]], ...] = (
         {"amplitude_l0": 1e-4, "recovery_s": 1e-3, "pca": 0.1},
     ),
     (r"[pP][cC][aA][ _=-]?(?P<pca>\d{1,2}\.\d+)", {}),
-    (r"[pP][cC][aA][ _=-]?(?P<pca>\d)(?!\d|\.\d)", {}),
+    # pCa4_5 may be 4.5, or 4 and the fifth trial.
+    (r"[pP][cC][aA][ _=-]?(?P<pca>\d)(?!\d|[._,p-]\d)", {}),
     (r"[pP][cC][aA][ _=-]?(?P<pca>\d{2})(?!\d|\.\d)", {"pca": 0.1}),
+    (r"[pP][cC][aA][ _=-]?(?P<pca>1\d)(?!\d|\.\d)", {}),
     (r"(?<!\d)(?P<pca>\d{2})[pP][cC][aA]", {"pca": 0.1}),
 )
 
@@ -47,4 +51,4 @@ def _found(pattern: str, factors: dict[str, float], name: str) -> dict[str, floa
     if match is None:
         return None
     values = {key: float(f"{float(text) * factors.get(key, 1.0):.12g}") for key, text in match.groupdict().items()}
-    return values if PCA_RANGE[0] <= values["pca"] <= PCA_RANGE[1] else None
+    return values if _USUAL_PCA[0] <= values["pca"] <= _USUAL_PCA[1] else None

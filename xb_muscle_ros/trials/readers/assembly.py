@@ -48,6 +48,7 @@ def trial_of(recording: Recording, mapping: ImportMapping, path: Path, isometric
     draft = Draft(recording, mapping, [mapping.source, *recording.notes], [*recording.warnings])
     given, signal = recording.facts, recording.signals.get("force")
     _check_facts(draft)
+    _compare_facts(draft, path)
     clock = read_clock(draft)
     release(recording.signals["time"].values)
     length = read_length(draft, clock.time_s)
@@ -100,6 +101,22 @@ def _check_facts(draft: Draft) -> None:
         if value is not None and not low <= value <= high:
             allowed = f"allowed is {low:g} to {high:g}; look at {draft.mapping.where}"
             raise UserError(f"{draft.where}: {name} is {value:g}; {allowed}")
+
+
+def _compare_facts(draft: Draft, path: Path) -> None:
+    """Warn where the name of the file tells another fact than the option or the mapping."""
+    mapping = draft.mapping
+    for name, told in mapping.named(path).items():
+        given = mapping.facts.get(name)
+        if given is None or given == told:
+            continue
+        if name in mapping.sure:
+            draft.warn(f"{name} is {given:g}, as the option gives it; the file's name tells {told:g}")
+        else:
+            draft.warn(
+                f"{name} is {told:g}, as the file's name tells by file_name.pattern; the mapping's {given:g} is for "
+                f"names that tell none: to have it, take the pattern out or give --{name.partition('_')[0]}"
+            )
 
 
 def _check_cover(draft: Draft, force: Signal, time_s: Array, force_s: Array) -> None:

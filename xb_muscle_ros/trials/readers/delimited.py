@@ -86,7 +86,29 @@ def _table(path: Path, lines: _Lines, separator: str | None, options: TableOptio
     while end and not body[end - 1].strip(f'{mark} \t"'):  # rows a spreadsheet adds
         end -= 1
     rows = TextRows(body[:end], body.numbers[:end], mark)
-    return make_table(path, "", head, rows, options, (encoding,), starts, rate_of(above))
+    table = make_table(path, "", head, rows, options, (encoding,), starts, rate_of(above))
+    if mark == SPACES:
+        _check_whole(table)
+    return table
+
+
+def _check_whole(table: Table) -> None:
+    """Every row between blanks has all its cells: where one is empty, those behind it would move to its place.
+
+    Raises:
+        UserError: a row is short.
+    """
+    if table.rows.matrix(table.decimal) is not None:
+        return
+    width = len(table.header)
+    short = [row for row, cells in enumerate(table.rows.cells) if len(cells) < width]
+    if short:
+        more = f", and so do {len(short) - 1} more" if len(short) > 1 else ""
+        raise UserError(
+            f"{table.where}, {table.place(short[0])} has {len(table.rows.cells[short[0]])} cells between blanks{more}; "
+            f"needed are {width}: {', '.join(table.header)}; which of them is empty cannot be told: write nan there, "
+            "export the table with tabs or commas, or remove the line"
+        )
 
 
 def _exported(path: Path, lines: _Lines, export: Export, options: TableOptions, encoding: str) -> Table:

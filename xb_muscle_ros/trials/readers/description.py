@@ -103,6 +103,7 @@ class ImportMapping:
         gear_ratio: of a lever between motor and muscle; length is divided by it, force multiplied with it.
         reference_note: where the reference length comes from.
         own_keys: keys the mapping itself has, dotted as ``columns.force.unit``, rather than the reader for it.
+        sure: those of `FACTS` that an option gives, which hold whatever the name of a file tells.
     """
 
     where: str
@@ -140,6 +141,7 @@ class ImportMapping:
     gear_ratio: float | None = None
     reference_note: str = "given"
     own_keys: frozenset[str] = frozenset()
+    sure: frozenset[str] = frozenset()
 
     @property
     def columns(self) -> dict[str, Column]:
@@ -156,23 +158,36 @@ class ImportMapping:
         return tuple(pattern for pattern in found if pattern is not None)
 
     def facts_of(self, path: Path) -> dict[str, float | None]:
-        """pCa, amplitude (L0) and recovery (s) of one file; what its name tells goes before what holds for all.
+        """pCa, amplitude (L0) and recovery (s) of one file.
+
+        What its name tells goes before what the mapping tells for all, and what an option tells goes before both.
 
         Raises:
             UserError: the file name does not match the pattern.
         """
-        facts: dict[str, float | None] = {name: self.facts.get(name) for name in FACTS}
-        if self.file_name is not None:
-            match = self.file_name.search(name_of(path))
-            if match is None:
-                raise UserError(
-                    f"{path}: the file name does not match '{self.file_name.pattern}' of {self.where}; "
-                    "use the mapping made for this file"
-                )
-            for name, text in match.groupdict().items():
-                if text is not None:
-                    facts[name] = fact_of(text, self.factors.get(name, 1.0), name, str(path))
-        return facts
+        named = self.named(path)
+        told = {name: value for name, value in named.items() if name not in self.sure}
+        return {name: told.get(name, self.facts.get(name)) for name in FACTS}
+
+    def named(self, path: Path) -> dict[str, float]:
+        """What the name of a file tells.
+
+        Raises:
+            UserError: it does not match the pattern.
+        """
+        if self.file_name is None:
+            return {}
+        match = self.file_name.search(name_of(path))
+        if match is None:
+            raise UserError(
+                f"{path}: the file name does not match '{self.file_name.pattern}' of {self.where}; "
+                "use the mapping made for this file"
+            )
+        return {
+            name: fact_of(text, self.factors.get(name, 1.0), name, str(path))
+            for name, text in match.groupdict().items()
+            if text is not None
+        }
 
 
 def fact_of(text: str, factor: float, name: str, where: str) -> float:

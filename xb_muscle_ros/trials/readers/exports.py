@@ -18,7 +18,9 @@ from xb_muscle_ros.trials.readers.units import UNITS, unit_in
 _LABVIEW_END = "***End_of_Header***"
 _LABVIEW_SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
 _LABCHART_KEY = re.compile(r"([A-Z]\w*)=")
-LABCHART_TIME = "Time"
+_LABCHART_TIME = "Time"
+# Rows that show how many columns there are.
+_LOOKED_AT = 100
 # A line above a table that tells its rate: the words for it, then a number and its unit, in either order.
 _RATE = re.compile(
     r"(?:sampl\w*|scan|acquisition|data)[ _-]*(?P<what>rate|freq\w*|interval|period)\b\W*?"
@@ -117,17 +119,28 @@ def _labchart(where: str, lines: Sequence[str]) -> Export:
             titles.pop()
         if not titles:
             raise UserError(f"{where}: a LabChart block has no line ChannelTitle=; export it again with channel titles")
-        if header and header[1:] != tuple(titles):
+        # The program can leave its column of time out.
+        time = () if _fit(lines[first:end], len(titles)) else (_LABCHART_TIME,)
+        if header and header != (*time, *titles):
             raise UserError(
-                f"{where}: LabChart blocks have different channels: {', '.join(header[1:])}, then {', '.join(titles)}; "
-                "export blocks of like channels into one file each"
+                f"{where}: LabChart blocks have different columns: {', '.join(header)}, then "
+                f"{', '.join((*time, *titles))}; export blocks of like columns into one file each"
             )
         if not header:
             told = [cell if cell != "*" else "" for cell in keys.get("UnitName", [])]
-            header, place = (LABCHART_TIME, *titles), start + list(keys).index("ChannelTitle")
-            units = ("s", *(told + [""] * len(titles))[: len(titles)])
+            header, place = (*time, *titles), start + list(keys).index("ChannelTitle")
+            units = (*("s" for _ in time), *(told + [""] * len(titles))[: len(titles)])
         blocks.append(Block(first, end, _hz(" ".join(keys["Interval"]), "time")))
     return Export("LabChart", "\t", header, units, place, tuple(blocks), None)
+
+
+def _fit(rows: Sequence[str], titles: int) -> bool:
+    """Whether the first rows have a cell for each title and none for time; a comment may stand behind them."""
+    widest = 0
+    for row in rows[:_LOOKED_AT]:
+        cells = row.split("\t")
+        widest = max(widest, next((i for i, cell in enumerate(cells) if cell.startswith("#")), len(cells)))
+    return widest == titles
 
 
 def _labview(where: str, lines: Sequence[str]) -> Export:

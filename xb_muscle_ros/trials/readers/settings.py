@@ -138,13 +138,15 @@ class ImportSettings:
     def _built(self, reader: Reader, matching: tuple[int, ...], found: Told) -> tuple[ImportMapping, str]:
         """The mapping of such files, with what they tell themselves, and its digest."""
         tree = merged(found.tree, self._merged(reader, matching))
-        told = json.dumps([VERSION, reader.name, self.isometric_scaling, _with_text_keys(tree)], sort_keys=True)
+        sure = frozenset(name for name in FACTS if self._overrides.get(name) is not None)
+        decides = [VERSION, reader.name, self.isometric_scaling, _with_text_keys(tree), *sorted(sure)]
+        told = json.dumps(decides, sort_keys=True)
         try:
             made = build_mapping(tree, self._where, reader.kind, reader.in_header)
             _check_format(made, tree, reader)
         except UserError as problem:
             raise MappingError(str(problem)) from None
-        made = replace(made, told=found.lines, own_keys=frozenset(dotted_keys(self._own(matching))))
+        made = replace(made, told=found.lines, own_keys=frozenset(dotted_keys(self._own(matching))), sure=sure)
         return made, hashlib.sha256(told.encode()).hexdigest()
 
 
