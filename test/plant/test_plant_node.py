@@ -65,9 +65,8 @@ class Stage:
 
     def until(self, condition: Callable[[], Any]) -> None:
         """Wait until something holds."""
-        logs = {name: process.log()[-600:] for name, process in self.processes.items()}
         assert self.link.wait_for(lambda: bool(condition()), PATIENCE_S), (
-            logs,
+            {name: process.log()[-600:] for name, process in self.processes.items()},
             {s: len(j) for s, j in self.joints.items()},
         )
 
@@ -174,7 +173,8 @@ def test_realtime_survives_the_death_of_either_side(stage: Stage) -> None:
     # The first to end may be one that the killed node had played to its last tick.
     stage.until(lambda: stage.log("plant/c").count("episode of 500 ticks") > before + 1)
     stage.kill("plant/c")
-    stage.until(lambda: "no length for 0.2" in stage.log("muscle/c"))
+    # A slow machine may have been late before.
+    stage.until(lambda: stage.log("muscle/c").rfind("no length for") > stage.log("muscle/c").rfind("length is back"))
     stage.plant("/c", "realtime", duration_s=0.5)
     stage.until(lambda: stage.log("plant/c").count("episode of 500 ticks") >= 1)
     assert "Traceback" not in "".join(stage.log(name) for name in stage.processes)

@@ -53,7 +53,8 @@ class DaskCluster:
         self._processes: list[subprocess.Popen[bytes]] = []
         file = folder / "scheduler.json"
         self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file))
-        wait_until(file.exists, "the scheduler did not start")
+        # The file is there before it is written.
+        wait_until(lambda: file.exists() and file.read_text().endswith("}"), "the scheduler did not start")
         self.address: str = json.loads(file.read_text())["address"]
         if workers is not None:
             self.start_workers(*workers)

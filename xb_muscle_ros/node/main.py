@@ -34,9 +34,9 @@ def _play(arguments: list[str], stop: program.Stop) -> None:
         executor = program.make_executor()
         executor.add_node(node)
         while not stop() and not node.finished:
-            executor.spin_once(timeout_sec=0.1)
+            program.serve_once(executor, 0.1)
         # Let the answer to the request that ended the node go out.
-        executor.spin_once(timeout_sec=0.1)
+        program.serve_once(executor, 0.1)
         executor.shutdown()
     finally:
         node.close()

@@ -9,6 +9,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from types import FrameType
 from typing import Any
 
@@ -127,7 +128,7 @@ def _hint(arguments: list[str], error: str) -> str:
 
 
 def make_executor(context: Any = None) -> Any:
-    """Return an executor to be driven by ``spin_once(timeout_sec=...)``, single-threaded.
+    """Return an executor to be driven by `serve_once`, single-threaded.
 
     The one driven by events answers in two thirds of the time, but early releases of Jazzy do not have it, and its
     ``spin`` without a timeout does not return.
@@ -141,3 +142,15 @@ def make_executor(context: Any = None) -> Any:
     except ImportError:
         return SingleThreadedExecutor(context=context)
     return EventsExecutor(context=context)
+
+
+def serve_once(executor: Any, timeout_s: float) -> None:
+    """Serve what comes within a time, s.
+
+    What a subscription still had to tell when it was given up (that a publisher's quality of service does not fit it,
+    for example) is nobody's any more; rclpy raises where it meets that.
+    """
+    from rclpy.exceptions import InvalidHandle
+
+    with suppress(InvalidHandle):
+        executor.spin_once(timeout_sec=timeout_s)

@@ -16,7 +16,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.node.program import make_executor, take_in_news
+from xb_muscle_ros.node.program import make_executor, serve_once, take_in_news
 from xb_muscle_ros.node.status import Account
 
 _ANSWER_S = 10.0
@@ -87,7 +87,7 @@ class Link:
             rest = end - time.monotonic()
             if rest <= 0.0 or self.stop():
                 return False
-            self._executor.spin_once(timeout_sec=min(rest, 0.05))
+            serve_once(self._executor, min(rest, 0.05))
         return True
 
     def find(self, timeout_s: float, start_command: str) -> None:

@@ -61,7 +61,8 @@ class NodeProcess:
             text = str(value).lower() if isinstance(value, bool) else str(value)
             command += ["-p", f"{name}:={text}"]
         self._asked = False
-        self._log = tempfile.TemporaryFile("w+", encoding="utf-8")  # noqa: SIM115 - closed at the exit
+        # Appended to: the child shares this file's position, which `log` moves.
+        self._log = tempfile.TemporaryFile("a+", encoding="utf-8")  # noqa: SIM115 - closed at the exit
         self.process = subprocess.Popen(
             command, env=child_environment(domain_id), stdout=self._log, stderr=self._log, stdin=subprocess.DEVNULL
         )
