@@ -98,10 +98,27 @@ def test_a_command_gives_way_to_what_was_measured_and_says_so(tmp_path: Path) ->
 
 
 def test_a_name_and_a_unit_that_contradict_each_other_are_not_taken(tmp_path: Path) -> None:
-    file = table(tmp_path / "a.csv", {"time_s": TIME_S, "length (deg)": LENGTH_MM, "force (g)": FORCE_MN})
+    file = table(tmp_path / "a.csv", {"time_s": TIME_S, "length (deg)": LENGTH_MM, "force (W)": FORCE_MN})
     found = inspect_file(file)
     assert set(found.recognition.roles) == {"time"}
-    assert "9.80665 mN" in found.recognition.taken_for["force (g)"]
+    assert "its unit 'W' is none (a power)" in found.recognition.taken_for["force (W)"]
+
+
+def test_an_unknown_unit_of_a_named_signal_is_left_to_be_filled_in(tmp_path: Path) -> None:
+    file = table(tmp_path / "a_pCa45.csv", {"time_s": TIME_S, "length_mm": LENGTH_MM, "force (lbf)": FORCE_MN})
+    found = inspect_file(file)
+    assert found.recognition.roles["force"].content.name == "force (lbf)"
+    assert "its unit 'lbf' is not known" in found.recognition.taken_for["force (lbf)"]
+    assert [line.partition(":")[0] for line in found.proposal.missing] == ["unit of force (force (lbf))", "f0"]
+    assert "    # unit:  # fill in: one of N" in found.proposal.text
+    assert not found.imports
+
+
+def test_grams_are_the_weight_of_a_mass(tmp_path: Path) -> None:
+    file = table(tmp_path / "a_pCa45.csv", {"time_s": TIME_S, "length_mm": LENGTH_MM, "force (g)": FORCE_MN})
+    found = inspect_file(file)
+    assert found.proposal.tree["columns"]["force"]["unit"] == "g"
+    assert [line.partition(":")[0] for line in found.proposal.missing] == ["f0"]
 
 
 def test_lengths_below_zero_are_a_change(tmp_path: Path) -> None:

@@ -147,7 +147,7 @@ def test_what_both_tell_is_as_the_mapping_says(tmp_path: Path, write: Write) -> 
 @pytest.mark.parametrize(
     ("inputs", "keys", "words"),
     [
-        ([LENGTH, LIGHT, FORCE._replace(unit=b"grams")], {}, "channel 'Force': unit 'grams' of force is not known"),
+        ([LENGTH, LIGHT, FORCE._replace(unit=b"lbf")], {}, "channel 'Force': unit 'lbf' of force is not known"),
         (
             [LENGTH, LIGHT, FORCE._replace(unit=b"V")],
             {},

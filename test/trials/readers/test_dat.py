@@ -137,6 +137,12 @@ def test_units_of_the_file_count(tmp_path: Path) -> None:
     assert trial.time_s == pytest.approx(1e-3 * TIME_MS)
 
 
+@pytest.mark.parametrize(("unit", "factor"), [("g", 9.80665e-3), ("mg", 9.80665e-6), ("grams", 9.80665e-3)])
+def test_grams_are_the_weight_of_a_mass(tmp_path: Path, unit: str, factor: float) -> None:
+    trial = read(dat(tmp_path / "a.dat", names=NAMES.replace("Fin (mN)", f"Fin ({unit})")))
+    assert trial.force_n == pytest.approx(factor * FORCE_MN, rel=1e-5)
+
+
 def test_a_unit_that_is_not_known_has_to_be_given(tmp_path: Path) -> None:
     file = dat(tmp_path / "a.dat", names=NAMES.replace("Fin (mN)", "Fin (Ref)"))
     with pytest.raises(UserError, match=r"a\.dat, column 'Fin' is in 'Ref', which is no known unit .* --force-unit"):

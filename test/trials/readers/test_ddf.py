@@ -237,7 +237,7 @@ def test_samples_that_are_missing_are_told(tmp_path: Path) -> None:
         (swap(b"\n5\t0.600000", b"\n5\tinf"), "column 'AI0' is inf"),
         (swap(b"\n6\t", b"\n5\t"), "column 'Sample': 0.0025 s does not come after 0.0025 s"),
         (swap(b"Reference Length: 12.5 mm", b"Reference Length: 12.5 in"), "Reference Length: unit 'in' of length"),
-        (swap(b"Reference Force: 400.000 mN", b"Reference Force: 400.000 g"), "Reference Force: unit 'g' of force"),
+        (swap(b"Reference Force: 400.000 mN", b"Reference Force: 400.000 lbf"), "Reference Force: unit 'lbf' of force"),
     ],
 )
 def test_what_is_broken_is_told_in_one_line(tmp_path: Path, change: Callable[[bytes], bytes], words: str) -> None:
@@ -247,6 +247,13 @@ def test_what_is_broken_is_told_in_one_line(tmp_path: Path, change: Callable[[by
         read(file)
     assert words in str(refused.value)
     assert "trial.ddf" in str(refused.value)
+
+
+def test_forces_in_grams(tmp_path: Path) -> None:
+    units = {"Units": ["mm", "g", "TTL", "mm"]}
+    trial = read(ddf(tmp_path / "trial.ddf", {"Reference Force": "40 g"}, units))
+    assert trial.facts.f0_n == pytest.approx(0.392266, rel=1e-12)
+    assert trial.force_n == pytest.approx(500.0 * 9.80665e-3 * FORCE_V, rel=1e-5)
 
 
 @pytest.fixture(scope="module")

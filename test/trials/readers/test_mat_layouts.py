@@ -150,8 +150,8 @@ def test_a_struct_for_each_channel_has_its_unit(tmp_path: Path, save: Save, name
 
 
 def test_a_unit_of_the_file_that_is_not_known_is_one_line(tmp_path: Path, save: Save) -> None:
-    path = save(tmp_path / "f.mat", {**scaled(1.0), "force_unit": "grams"})
-    with pytest.raises(UserError, match=r"f\.mat: force: unit 'grams' of force is not known.*--force-unit"):
+    path = save(tmp_path / "f.mat", {**scaled(1.0), "force_unit": "lbf"})
+    with pytest.raises(UserError, match=r"f\.mat: force: unit 'lbf' of force is not known.*--force-unit"):
         read(path, columns={**COLUMNS, "force": {"column": "force"}})
 
 

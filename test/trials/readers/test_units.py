@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.readers.units import Quantity, quantity, unit_of
+from xb_muscle_ros.trials.inspecting.words import units_meant
+from xb_muscle_ros.trials.readers.units import Quantity, quantity, unit_in, unit_of
 
 
 @pytest.mark.parametrize(
@@ -19,6 +20,10 @@ from xb_muscle_ros.trials.readers.units import Quantity, quantity, unit_of
         ("mN", "force", "force", 1e-3),
         ("kPa", "force", "stress", 1e3),
         ("mN/mm²", "force", "stress", 1e3),
+        ("mN mm^-2", "force", "stress", 1e3),
+        ("N·cm⁻²", "force", "stress", 1e4),
+        ("mN/cm2", "force", "stress", 10.0),
+        ("g", "force", "force", 9.80665e-3),
         ("F0", "force", "relative force", 1.0),
         ("nM", "calcium", "calcium", 1e-3),
         ("M", "calcium", "calcium", 1e6),
@@ -26,6 +31,34 @@ from xb_muscle_ros.trials.readers.units import Quantity, quantity, unit_of
 )
 def test_units(text: str, column: str, kind: str, factor: float) -> None:
     assert unit_of(text, column, "here") == (kind, factor, "")
+
+
+@pytest.mark.parametrize(
+    ("text", "column", "name"),
+    [
+        ("% F0", "force", "%F0"),
+        ("% Fo", "force", "%F0"),
+        ("Po", "force", "F0"),
+        ("P/Po", "force", "F0"),
+        ("T/T0", "force", "F0"),
+        ("mN mm-2", "force", "mN/mm2"),
+        ("mN·mm⁻²", "force", "mN/mm2"),
+        ("mN.mm−2", "force", "mN/mm2"),
+        ("N cm-2", "force", "N/cm2"),
+        ("kN/m^2", "force", "kPa"),
+        ("N/m²", "force", "Pa"),
+        ("(grams)", "force", "g"),
+        ("% Lo", "length", "%L0"),
+        ("Lo", "length", "L0"),
+        ("g", "length", None),
+        ("mN m-3", "force", None),
+        ("Nm", "force", None),
+    ],
+)
+def test_units_as_files_write_them(text: str, column: str, name: str | None) -> None:
+    assert unit_in(text, column) == name
+    meant = units_meant(text.strip("()"))
+    assert (name is None) != (name in meant)
 
 
 def test_an_unknown_unit_is_answered_with_the_nearest() -> None:

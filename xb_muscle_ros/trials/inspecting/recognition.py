@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from xb_muscle_ros.trials.inspecting.words import OTHER_UNITS, Named, fitting, read_name, roles_of_unit
+from xb_muscle_ros.trials.inspecting.words import OTHER_UNITS, Named, fitting, read_name, roles_of_unit, units_meant
 from xb_muscle_ros.trials.readers.columns import SIGNALS
 from xb_muscle_ros.trials.readers.contents import Content, Contents
 from xb_muscle_ros.trials.readers.units import KINDS, UNITS, volts_of
@@ -116,6 +116,8 @@ def _by_name(content: Content, role: str, unit: str, named: Named) -> tuple[Reco
     if unit and not meant:
         allowed = ", ".join(known for known, each in UNITS.items() if each.kind in KINDS[role])
         other = OTHER_UNITS.get(unit.casefold(), "")
+        if not other and not units_meant(unit):
+            return Recognised(content, role, "", f"by its name; its unit '{unit}' is not known", False, named), ""
         return None, f"is called {role}, but its unit '{unit}' is none{f' ({other})' if other else ''}: {allowed}"
     if role == "stimulation" and not unit:
         meant = "V"

@@ -6,7 +6,7 @@ import re
 import unicodedata
 from typing import NamedTuple
 
-from xb_muscle_ros.trials.readers.units import KINDS, UNITS
+from xb_muscle_ros.trials.readers.units import KINDS, UNITS, simple
 
 # Words for each role; accents and case play no part. A single letter counts where it is the whole name.
 _WORDS = {
@@ -50,20 +50,20 @@ _SPELLINGS = {
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sekunden": "s", "msec": "ms", "millisecond": "ms",
     "milliseconds": "ms", "usec": "us", "micron": "um", "microns": "um", "micrometer": "um", "micrometers": "um",
     "_": "1", "-": "1", "–": "1",
-    "l/l0": "L0", "l/lo": "L0", "lo": "L0", "l0": "L0", "ml0": "L0", "% l0": "%L0", "%l0": "%L0", "%lo": "%L0",
-    "f/f0": "F0", "p/p0": "F0", "f/fmax": "F0", "fo": "F0", "f0": "F0", "p0": "F0", "%f0": "%F0", "%p0": "%F0",
-    "kn/m2": "kPa", "kn/m^2": "kPa", "kn/m²": "kPa", "n/m2": "Pa", "n/m^2": "Pa", "n/mm2": "MPa", "n/mm^2": "MPa",
-    "mn/mm^2": "mN/mm2", "n/cm^2": "N/cm2", "newton": "N", "newtons": "N", "volt": "V", "volts": "V", "-log m": "pCa",
-    "µmol/l": "uM", "umol/l": "uM", "nmol/l": "nM", "mmol/l": "mM", "mol/l": "M", "µm": "um",
+    "l/l0": "L0", "l/lo": "L0", "lo": "L0", "l0": "L0", "ml0": "L0", "%l0": "%L0", "%lo": "%L0",
+    "f/f0": "F0", "f/fo": "F0", "p/p0": "F0", "p/po": "F0", "t/t0": "F0", "t/to": "F0", "f/fmax": "F0", "fo": "F0",
+    "f0": "F0", "p0": "F0", "po": "F0", "%f0": "%F0", "%fo": "%F0", "%p0": "%F0", "%po": "%F0", "kn/m2": "kPa",
+    "n/m2": "Pa", "n/mm2": "MPa", "newton": "N", "newtons": "N", "gf": "g", "gram": "g", "grams": "g", "volt": "V",
+    "volts": "V", "-log m": "pCa", "umol/l": "uM", "nmol/l": "nM", "mmol/l": "mM", "mol/l": "M",
 }  # fmt: skip
 # Units of other things, or ones that import does not read, and what to do about them.
 OTHER_UNITS = {
-    "g": "grams: 1 g pulls with 9.80665 mN", "mg": "milligrams: 1 mg pulls with 9.80665 uN",
-    "kg": "kilograms: 1 kg pulls with 9.80665 N", "deg": "an angle", "rad": "an angle", "°c": "a temperature",
+    "deg": "an angle", "rad": "an angle", "°c": "a temperature",
     "degc": "a temperature", "nm/s": "a speed", "mm/s": "a speed", "m/s": "a speed", "l0/s": "a speed",
     "nm.": "a torque", "w": "a power", "a": "a current", "ma": "a current", "samples": "a number of samples",
     "pixel": "pixels", "px": "pixels", "au": "arbitrary units", "a.u.": "arbitrary units", "min": "minutes",
 }  # fmt: skip
+_MASSES = ("kg", "g", "mg")
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[(\[{](?P<unit>[^()\[\]{}]*)[)\]}]\s*$")
 _SLASH = re.compile(r"^(?P<name>.+?)\s+(?:/|in|,)\s+(?P<unit>\S+)$|^(?P<name2>.+?),\s*(?P<unit2>\S+)$")
 _END = re.compile(r"^(?P<name>.*[^\W_])[\s_]+(?P<unit>%?[^\W_][^\s_]*)$")
@@ -91,8 +91,7 @@ class Named(NamedTuple):
 
 def units_meant(text: str) -> tuple[str, ...]:
     """Units, as a mapping has them, that a text may mean, the likeliest first: ``um`` may be micrometres or µM."""
-    plain = unicodedata.normalize("NFKC", text).strip()
-    plain = plain.replace("μ", "u").replace("²", "2")
+    plain = simple(text)
     if plain in UNITS:
         exact: tuple[str, ...] = (plain,)
     elif plain.casefold() in _SPELLINGS:
@@ -111,6 +110,8 @@ def fitting(text: str, role: str) -> str:
 def roles_of_unit(text: str) -> tuple[str, ...]:
     """Roles that a unit, as it is written exactly, belongs to."""
     meant = units_meant(text)[:1]
+    if meant and meant[0] in _MASSES:  # what has no name of a force may be a mass
+        return ()
     return tuple(role for role, kinds in KINDS.items() if role != "rate" and meant and UNITS[meant[0]].kind in kinds)
 
 
@@ -144,7 +145,7 @@ def _split(name: str) -> tuple[str, str]:
             continue
         parts = match.groupdict()
         rest, unit = parts["name"] or parts["name2"], parts["unit"] or parts["unit2"]
-        if (units_meant(unit) and unit != "1") or (len(unit) > 1 and unit.casefold() in OTHER_UNITS) or unit == "g":
+        if (units_meant(unit) and unit != "1") or (len(unit) > 1 and unit.casefold() in OTHER_UNITS):
             return rest.strip(), unit
     return name, ""
 

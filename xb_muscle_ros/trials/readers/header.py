@@ -12,7 +12,7 @@ from xb_muscle_ros.trials.readers.calcium import SAME_PCA, pcas_in
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping, name_of
 from xb_muscle_ros.trials.readers.lines import Amount
 from xb_muscle_ros.trials.readers.mapping import f0_faults
-from xb_muscle_ros.trials.readers.units import KINDS, UNITS, Quantity, calibration, unit_of, volts_of
+from xb_muscle_ros.trials.readers.units import KINDS, UNITS, Quantity, calibration, unit_in, unit_of, volts_of
 
 PREFIX = "columns."
 
@@ -32,7 +32,7 @@ def scaled(signal: Signal, key: str, unit: str, column: Column, mapping: ImportM
     """
     told = f"{PREFIX}{key}.unit" in mapping.own_keys
     known = [name for name, each in UNITS.items() if each.kind in KINDS[key]]
-    if _plain(unit) not in known:
+    if unit_in(unit, key) is None:
         if told:
             return signal
         found = f"is in '{unit}', which is no known unit of {key}" if unit else "has no unit"
@@ -40,17 +40,13 @@ def scaled(signal: Signal, key: str, unit: str, column: Column, mapping: ImportM
         if volts := volts_of(unit, key):
             remedy += f", as {calibration(key, volts)}"
         raise UserError(f"{path}, {signal.name} {found}; known: {', '.join(known)}; {remedy}, or name another column")
-    own = unit_of(unit, key, str(path))
+    own = unit_of(unit_in(unit, key) or unit, key, str(path))
     if told and column.unit != own:
         raise UserError(
             f"{path}, {signal.name} is in {unit} by the file, in {column.unit_name} by {mapping.where}; leave "
             f"{PREFIX}{key}.unit out, or mend the file"
         )
     return replace(signal, values=signal.values * (own.factor / column.unit.factor))
-
-
-def _plain(unit: str) -> str:
-    return unit.replace("µ", "u").replace("μ", "u").replace("²", "2")
 
 
 def is_told(found: Amount | None) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from typing import NamedTuple
 
 from xb_muscle_ros.errors import UserError, suggest
@@ -32,8 +33,9 @@ _FACTORS = {
     "rate": {"Hz": 1.0, "kHz": 1e3},
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9},
     "relative length": {"L0": 1.0, "%L0": 1e-2},
-    "force": {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9},
-    "stress": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "mN/mm2": 1e3, "N/cm2": 1e4},
+    # A force in grams is the weight of that mass, by the standard acceleration 9.80665 m/s².
+    "force": {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "kg": 9.80665, "g": 9.80665e-3, "mg": 9.80665e-6},
+    "stress": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "mN/mm2": 1e3, "N/cm2": 1e4, "mN/cm2": 10.0},
     "relative force": {"F0": 1.0, "%F0": 1e-2},
     "calcium": {"M": 1e6, "mM": 1e3, "uM": 1.0, "nM": 1e-3},
     # A logarithm, hence no factor: whoever converts it has to know.
@@ -56,11 +58,14 @@ _SPELLINGS = {
     **dict.fromkeys(("msec", "millisecond", "milliseconds"), "ms"),
     **dict.fromkeys(("usec", "microsecond", "microseconds"), "us"),
     **dict.fromkeys(("micron", "microns", "micrometer", "micrometre"), "um"),
-    **dict.fromkeys(("mN/mm^2", "mN mm-2", "mN*mm^-2", "kN/m2", "kN/m^2", "kpa", "KPa"), "kPa"),
-    **dict.fromkeys(("N/mm2", "N/mm^2"), "MPa"),
-    **dict.fromkeys(("N/cm^2",), "N/cm2"),
-    **dict.fromkeys(("F/F0", "Fo"), "F0"),
-    **dict.fromkeys(("L/L0", "Lo"), "L0"),
+    **dict.fromkeys(("kN/m2", "kpa", "KPa"), "kPa"),
+    **dict.fromkeys(("N/mm2",), "MPa"),
+    **dict.fromkeys(("N/m2",), "Pa"),
+    **dict.fromkeys(("F/F0", "F/Fo", "Fo", "P/P0", "P/Po", "P0", "Po", "T/T0", "T/To"), "F0"),
+    **dict.fromkeys(("%Fo", "%P0", "%Po"), "%F0"),
+    **dict.fromkeys(("L/L0", "L/Lo", "Lo"), "L0"),
+    **dict.fromkeys(("%Lo",), "%L0"),
+    **dict.fromkeys(("gf", "gram", "grams"), "g"),
     **dict.fromkeys(("pca", "-log[Ca]"), "pCa"),
     **dict.fromkeys(("volt", "volts", "Volt", "Volts"), "V"),
     **dict.fromkeys(("millivolt", "millivolts", "mVolt", "mVolts"), "mV"),
@@ -71,6 +76,8 @@ _PER_VOLT = re.compile(
     r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>\S+?)\s*/\s*(?P<per>m?V)\s*"
 )
 VOLTS = ("V", "mV")
+# A stress by its area: ``mN/mm^2``, ``N cm-2``, ``kN.m^-2``.
+_PER_AREA = re.compile(r"(?P<unit>[A-Za-z]+)(?:\s*/\s*(?P<area>mm|cm|m)\^?2|[ .*·⋅](?P<area_below>mm|cm|m)\^?-2)")
 _BRACKETED = re.compile(r"[(\[{<]\s*([^()\[\]{}<>]+?)\s*[)\]}>]\s*$")
 _BEHIND = re.compile(r"[\w)][_ ,/;]+\s*([^\W\d_][^\s_,;]*|%\w+)$")
 
@@ -98,7 +105,7 @@ def unit_of(text: str, column: str, where: str) -> Unit:
     Raises:
         UserError: unknown unit, one of something else, or a calibration of zero.
     """
-    name = _simple(text)
+    name = simple(text)
     allowed = [known for known, unit in UNITS.items() if unit.kind in KINDS[column]]
     if column in _CALIBRATED and name.rpartition("/")[2] in VOLTS and name.rpartition("/")[0] in allowed:
         raise UserError(f"{where}: unit '{text}' of {column} lacks the number before it, for example '0.5 {text}'")
@@ -120,7 +127,7 @@ def unit_of(text: str, column: str, where: str) -> Unit:
 
 def unit_in(text: str, column: str) -> str | None:
     """The name of the unit that text in a file stands for, where it is one of the column's; None where not."""
-    name = _simple(text.strip().strip("()[]{}<>").strip())
+    name = simple(text.strip().strip("()[]{}<>").strip())
     name = _SPELLINGS.get(name, name)
     return name if name != "1" and name in UNITS and UNITS[name].kind in KINDS[column] else None
 
@@ -175,13 +182,18 @@ def _number_and_unit(text: str) -> tuple[float, str]:
 def _plain_unit(text: str, column: str, what: str, where: str) -> Unit:
     """A unit that is no calibration."""
     allowed = ", ".join(known for known, unit in UNITS.items() if unit.kind in KINDS[column])
-    if text in VOLTS or _PER_VOLT.fullmatch(_simple(text)):
+    if text in VOLTS or _PER_VOLT.fullmatch(simple(text)):
         raise UserError(f"{where}: {what} is in '{text}'; needed is a {column} in one of {allowed}")
     return unit_of(text, column, f"{where}: {what}")
 
 
-def _simple(text: str) -> str:
-    return text.replace("µ", "u").replace("μ", "u").replace("²", "2")
+def simple(text: str) -> str:
+    """A unit in one way of writing: ``mN·mm⁻²``, ``mN mm^-2`` and ``mN/mm²`` are ``mN/mm2``."""
+    plain = unicodedata.normalize("NFKC", text).strip().replace("μ", "u").replace("\u2212", "-")
+    per = _PER_AREA.fullmatch(plain)
+    if per is not None:
+        return f"{per['unit']}/{per['area'] or per['area_below']}2"
+    return re.sub(r"^%\s+", "%", plain)
 
 
 def quantity(text: str, column: str, what: str, where: str, example: str = "42.8 mm", zero: bool = False) -> Quantity:
