@@ -27,14 +27,19 @@ NAMES = ("time", "soleus_r/fiber_length", "soleus_r/force")
 
 
 def sto(
-    path: Path, names: tuple[str, ...] = NAMES, gap: str = "\t", end: str = "\n", told: dict[str, str] | None = None
+    path: Path,
+    names: tuple[str, ...] = NAMES,
+    gap: str = "\t",
+    end: str = "\n",
+    told: dict[str, str] | None = None,
+    scale: float = 1.0,
 ) -> Path:
     """A file as OpenSim writes them; ``told`` changes the header, 'None' takes a line out."""
     facts = {"version": "3", "OpenSimVersion": "4.5", "inDegrees": "no", "nRows": str(COUNT), "nColumns": "3"}
     lines = ["forces", *(f"{key}={value}" for key, value in {**facts, **(told or {})}.items() if value != "None")]
     lines += ["endheader", "\t".join(names)]
     columns = zip(TIME_S, LENGTH_M, FORCE_N, strict=True)
-    lines += [gap.join((f"{t:.8f}", f"{x:.10f}", f"{f:.8f}")) for t, x, f in columns]
+    lines += [gap.join((f"{t:.8f}", f"{scale * x:.10f}", f"{f:.8f}")) for t, x, f in columns]
     path.write_bytes(end.join([*lines, ""]).encode())
     return path
 
@@ -154,3 +159,25 @@ def test_names_that_tell_volts_are_told(tmp_path: Path) -> None:
         sto(tmp_path / "a.sto", names=names), columns={"length": {"column": "length_V"}, "force": {"column": "force_V"}}
     )
     assert sum("its name tells V" in line for line in trial.warnings) == 2
+
+
+NORMALISED = ("time", "soleus_r.normalized_fiber_length", "soleus_r.active_fiber_force_multiplier")
+
+
+def test_normalised_columns_are_shares_of_l0_and_f0(tmp_path: Path) -> None:
+    file = sto(tmp_path / "a.sto", names=NORMALISED, scale=13.0)
+    assert [content.unit for content in READERS["sto"].contents(file).signals] == ["s", "L0", "F0"]
+    columns = {"length": {"column": NORMALISED[1]}, "force": {"column": NORMALISED[2]}}
+    trial = read(file, columns={"length": columns["length"]}, f0=None)
+    assert trial.facts.reference_length_m == 1.0
+    assert trial.length_change_l0[0] == pytest.approx(0.65 - 1.0)
+    with pytest.raises(MappingError, match="forces are in F0"):
+        read(file, columns=columns)
+
+
+@pytest.mark.parametrize("name", ["norm_fiber_length", "soleus/normFiberLength", "fiber_strain"])
+def test_a_mapping_that_reads_a_share_of_l0_in_m_is_told(tmp_path: Path, name: str) -> None:
+    file = sto(tmp_path / "a.sto", names=("time", name, "force"))
+    assert READERS["sto"].contents(file).signals[1].unit == "L0"
+    trial = read(file, columns={"length": {"column": name, "unit": "m"}}, f0=None)
+    assert f"column '{name}' is read in m, but its name tells a share of L0" in trial.warnings[0]

@@ -44,6 +44,8 @@ _CHANGES = {
     *("change", "dl", "delta", "dlength", "displacement", "deplacement", "auslenkung", "stretch", "strain", "δ", "ε"),
     "aenderung",
 }
+# What such names are of has no unit: a share of L0 or F0.
+_NORMALISED = {"normalized", "normalised", "norm", "multiplier", "strain"}
 _SARCOMERES = {"sl": "sarcomere", "sarcomere": "sarcomere", "sarkomer": "sarcomere", "hs": "half_sarcomere"}
 # Spellings of units; what is not here is compared with the units themselves.
 _SPELLINGS = {
@@ -79,6 +81,7 @@ class Named(NamedTuple):
         is_command: it is what was asked for, not what was measured.
         is_change: of length.
         length_of: what it is a length of, as a mapping has it; empty for the fibre.
+        is_normalised: it is a share of L0 or F0.
     """
 
     roles: tuple[str, ...]
@@ -87,6 +90,7 @@ class Named(NamedTuple):
     is_command: bool = False
     is_change: bool = False
     length_of: str = ""
+    is_normalised: bool = False
 
 
 def units_meant(text: str) -> tuple[str, ...]:
@@ -131,7 +135,15 @@ def read_name(name: str) -> Named:
     if length_of:
         roles["length"] = None
     spelt = {*words, rest.casefold()[:1] if rest[:1] in "Δδε" else ""}
-    return Named(tuple(roles), unit, why_not, bool(_COMMANDS & set(words)), bool((_CHANGES | {"δ"}) & spelt), length_of)
+    return Named(
+        tuple(roles),
+        unit,
+        why_not,
+        is_command=bool(_COMMANDS & set(words)),
+        is_change=bool((_CHANGES | {"δ"}) & spelt),
+        length_of=length_of,
+        is_normalised=bool(_NORMALISED & set(words)),
+    )
 
 
 def _split(name: str) -> tuple[str, str]:

@@ -2,7 +2,8 @@
 
 Header lines are ``key=value`` (``nRows``, ``nColumns``, ``inDegrees``, ...; ``datarows`` and ``datacolumns`` in older
 motion files) up to ``endheader``; then come the names of the columns, ``time`` among them, and the rows. Times are in
-s, lengths in m, forces in N, as everywhere in OpenSim.
+s, lengths in m, forces in N, as everywhere in OpenSim; what is normalised by its name (``normalized_fiber_length``,
+``active_fiber_force_multiplier``) is relative to optimal fibre length or maximal isometric force, which are L0 and F0.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ _NEEDED = "a storage file of OpenSim"
 _END = "endheader"
 # An import takes these where the mapping tells no others.
 _UNITS = {"length": "m", "force": "N"}
+_NORMALISED = {"length": "L0", "force": "F0"}
 _ROWS, _COLUMNS = ("nrows", "datarows"), ("ncolumns", "datacolumns")
 
 
@@ -96,11 +98,12 @@ class StoReader(Reader):
     takes = ("decimal",)
 
     def defaults_for(self, told: Mapping[str, Any]) -> Mapping[str, Any]:
-        """With the unit of force where the mapping names a column of it."""
+        """With the units of the columns that the mapping names; that of force where it names one."""
         columns = told.get("columns")
-        if not isinstance(columns, Mapping) or columns.get("force") is None:
-            return self.defaults
-        return {**self.defaults, "columns": {**self.defaults["columns"], "force": {"unit": _UNITS["force"]}}}
+        named = columns if isinstance(columns, Mapping) else {}
+        roles = ["length", *(["force"] if named.get("force") is not None else [])]
+        units = {role: {"unit": _unit_of(role, named.get(role))} for role in roles}
+        return {**self.defaults, "columns": {**self.defaults["columns"], **units}}
 
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
         """The one trial of the file."""
@@ -122,8 +125,17 @@ class StoReader(Reader):
 def _unit(name: str) -> str:
     """The unit of a column that its name does not tell."""
     named = read_name(name)
-    units = {_UNITS[role] for role in named.roles if role in _UNITS}
-    return units.pop() if len(units) == 1 and not named.unit else ""
+    roles = [role for role in named.roles if role in _UNITS]
+    return _own_unit(roles[0], name) if len(roles) == 1 and not named.unit else ""
+
+
+def _own_unit(role: str, name: str) -> str:
+    return (_NORMALISED if read_name(name).is_normalised else _UNITS)[role]
+
+
+def _unit_of(role: str, spec: object) -> str:
+    """The unit of a signal by the column that a mapping names for it."""
+    return _own_unit(role, str(spec.get("column", "")) if isinstance(spec, Mapping) else "")
 
 
 def _recording(path: Path, mapping: ImportMapping) -> Recording:
@@ -147,9 +159,15 @@ def _recording(path: Path, mapping: ImportMapping) -> Recording:
 
 
 def _doubts(path: Path, mapping: ImportMapping) -> Iterator[str]:
-    """Lines on columns whose names tell volts, which are read in something else."""
+    """Lines on columns whose names tell volts or no unit at all, which are read in something else."""
     for key, column in mapping.columns.items():
-        volts = volts_of(read_name(column.name).unit, key)
+        named = read_name(column.name)
+        if named.is_normalised and key in _NORMALISED and column.unit.kind in ("length", "force"):
+            yield (
+                f"{path}: column '{column.name}' is read in {column.unit_name}, but its name tells a share of "
+                f"{_NORMALISED[key]}; by columns.{key}.unit (--{key}-unit) give {_NORMALISED[key]}"
+            )
+        volts = volts_of(named.unit, key)
         if volts and volts != column.unit.per:
             yield (
                 f"{path}: column '{column.name}' is read in {column.unit_name}, but its name tells {volts}; by "
