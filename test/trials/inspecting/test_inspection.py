@@ -142,6 +142,15 @@ def test_one_signal_in_two_units_tells_its_scale(tmp_path: Path) -> None:
     assert found.trials[0].facts.reference_length_m == pytest.approx(1.2e-3, rel=1e-6)
 
 
+def test_facts_of_lengths_in_l0_and_forces_in_f0_scale_them(tmp_path: Path) -> None:
+    columns = {"time_s": TIME_S, "length (L0)": LENGTH_MM / 1.2, "force (F0)": FORCE_MN / 0.5}
+    facts = inspect_file(table(tmp_path / "a_pCa6.csv", columns, comments="# L0 = 1.2 mm\n# F0: 0.5 mN\n"))
+    assert (facts.trials[0].facts.reference_length_m, facts.trials[0].facts.f0_n) == pytest.approx((1.2e-3, 5e-4))
+    plain = inspect_file(table(tmp_path / "b_pCa6.csv", columns, comments="# F0: 97 kPa\n"))
+    assert (plain.trials[0].facts.reference_length_m, plain.trials[0].facts.f0_n) == (1.0, 1.0)
+    assert "# reference_length:  # may be filled in: how long one L0 is" in plain.proposal.text
+
+
 def test_faults_of_cells_and_clocks_are_placed(tmp_path: Path) -> None:
     times = TIME_S.copy()
     times[50:] += 0.3

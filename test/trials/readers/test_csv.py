@@ -51,6 +51,34 @@ def _check(trial: Trial) -> None:
     assert trial.warnings == ()
 
 
+@pytest.mark.parametrize("change", [False, True])
+def test_lengths_in_l0_and_forces_in_f0_with_the_length_and_the_force_of_one(tmp_path: Path, change: bool) -> None:
+    how = {"of_length": {"is": "change"}} if change else {}
+    path = _file(tmp_path, TIME_S, 100.0 * (STRAIN + (not change)), 100.0 * FORCE)
+    trial = read_csv(path, _mapping("%L0", "%F0", reference_length="1.25 mm", f0="0.9 mN", **how))
+    _check(trial)
+    assert (trial.facts.reference_length_m, trial.facts.f0_n) == pytest.approx((1.25e-3, 9e-4))
+    assert trial.length_m[-1] == pytest.approx(1.04 * 1.25e-3)
+    assert trial.force_n[0] == pytest.approx(0.4 * 9e-4)
+    assert "lengths come relative to L0 = 0.00125 m (given)" in trial.facts.source
+    assert "forces come relative to F0 = 0.0009 N" in trial.facts.source
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"reference_length": "1.25 m"}, r"L0 is 1.25 m; .*; is the reference length right\?"),
+        ({"f0": "0.9 nF0"}, "unit 'nF0' of force is not known"),
+        ({"f0": "1e-12 N"}, "f0 is 1e-12 N; allowed is"),
+    ],
+)
+def test_a_length_of_l0_or_force_of_f0_that_no_muscle_has_is_refused(
+    tmp_path: Path, keys: dict[str, str], words: str
+) -> None:
+    with pytest.raises(UserError, match=words):
+        read_csv(_file(tmp_path, TIME_S, 1.0 + STRAIN, FORCE), _mapping("L0", "F0", **keys))
+
+
 def test_lengths_in_mm_and_forces_in_mN(tmp_path: Path) -> None:
     path = _file(tmp_path, TIME_S, 20.0 * (1 + STRAIN), 300.0 * FORCE)
     trial = read_csv(path, _mapping("mm", "mN", f0="300 mN"))

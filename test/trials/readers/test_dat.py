@@ -184,6 +184,24 @@ def test_what_the_mapping_tells_goes_before_the_header(tmp_path: Path) -> None:
     assert read(file, reference_length="first_isometric").facts.reference_length_m == pytest.approx(1.25e-3)
 
 
+def test_l0_and_f0_of_the_header_are_those_of_lengths_in_l0_and_forces_in_f0(tmp_path: Path) -> None:
+    names = "Time (ms)  Lin (L0)  Lout (mm)  Fin (F0)  Fout (mN)"
+    columns = zip(TIME_MS, LENGTH_MM / L0_MM, FORCE_MN / 0.5, strict=True)
+    rows = [f"{t:.1f}  {x:.8f}  {x:.6f}  {f:.8f}  0.0" for t, x, f in columns]
+    file = dat(tmp_path / "a.dat", {"Reference Force": "0.5 mN"}, names=names, rows=rows)
+    with pytest.raises(UserError, match=r"column 'Lin' is in L0 by the file, .*; give it as columns\.length\.unit or"):
+        read(file)
+    own = {"columns": {"length": {"unit": "L0"}, "force": {"unit": "F0"}}, "f0": None}
+    trial = read(file, **own)
+    assert (trial.facts.reference_length_m, trial.facts.f0_n) == pytest.approx((1e-3 * L0_MM, 5e-4))
+    assert trial.length_m == pytest.approx(1e-3 * LENGTH_MM, abs=1e-9)
+    assert trial.force_n == pytest.approx(1e-3 * FORCE_MN, abs=1e-9)
+    assert "L0 = 0.00125 m (Fiber Length of the header)" in trial.facts.source
+    without = dat(tmp_path / "b.dat", {"Fiber Length": "0 mm"}, names=names, rows=rows)
+    facts = read(without, **own).facts
+    assert (facts.reference_length_m, facts.f0_n) == (1.0, 1.0)
+
+
 def test_two_lengths_of_the_fibre_are_told(tmp_path: Path) -> None:
     (warning,) = read(dat(tmp_path / "a.dat", {"Initial Length": "1.10 mm"})).warnings
     assert "has Fiber Length 1.250 mm and Initial Length 1.10 mm; L0 is the former; give --reference-length" in warning

@@ -344,3 +344,10 @@ def test_a_zero_of_force_goes_through_the_gear(tmp_path: Path) -> None:
         for more in ({}, {"gear_ratio": 2.0})
     )
     assert geared.force_n == pytest.approx(2.0 * plain.force_n, abs=1e-12)
+
+
+def test_changes_in_l0_are_scaled_by_the_header_s_length(tmp_path: Path) -> None:
+    table = {"Units": ["Lo", "mN", "TTL", "mm"], "Scale (units/V)": ["0.08", "500.000000", "0.200000", "1.000000"]}
+    trial = read(ddf(tmp_path / "a.ddf", table=table), columns={"length": {"unit": "L0"}})
+    assert trial.facts.reference_length_m == pytest.approx(12.5e-3)
+    assert trial.length_m == pytest.approx(12.5e-3 + 1e-3 * (LENGTH_V - 0.6), abs=1e-9)

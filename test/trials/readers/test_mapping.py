@@ -32,6 +32,7 @@ TREE: dict[str, Any] = {
 
 
 ACTIVATION = {"rest": "0.05 uM", "tetanus": "5.1 pCa", "rise": "50 ms", "decay": "30 ms"}
+SARCOMERES_IN_L0 = {"column": "l", "unit": "L0", "of": "sarcomere"}
 
 
 def _changed(*path: str, value: Any = None) -> dict[str, Any]:
@@ -85,7 +86,15 @@ def test_a_file_name_that_does_not_match_is_refused() -> None:
         (_changed("f0"), "forces are in kPa, so f0 is needed"),
         (_changed("f0", value="1 N"), "f0 is a force, the force column a stress"),
         (_changed("columns", "force"), "there is no force column, so f0 has no use"),
-        (_changed("columns", "force", "unit", value="F0"), "forces are in F0, so f0 has no use"),
+        (_changed("columns", "force", "unit", value="F0"), "forces are in F0 and f0 is a stress, which has no use"),
+        (
+            {**_changed("columns", "length", "unit", value="L0"), "reference_length": "first_isometric"},
+            "lengths are in L0, so 'reference_length: first_isometric' has no use",
+        ),
+        (
+            {**_changed("columns", "length", value=SARCOMERES_IN_L0), "reference_length": "2.4 um"},
+            "sarcomere lengths are in L0, so reference_length has no use",
+        ),
         (_changed("pca", value="low"), "pca is 'low'; needed is a finite number"),
         (_changed("isometric_scaling", "fractions_f0", value={4.5: -1}), "at pCa 4.5 is -1"),
         (_changed("isometric_scaling", "fractions_f0", value=[1, 2]), "needed is a table"),

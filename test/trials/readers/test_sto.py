@@ -171,8 +171,8 @@ def test_normalised_columns_are_shares_of_l0_and_f0(tmp_path: Path) -> None:
     trial = read(file, columns={"length": columns["length"]}, f0=None)
     assert trial.facts.reference_length_m == 1.0
     assert trial.length_change_l0[0] == pytest.approx(0.65 - 1.0)
-    with pytest.raises(MappingError, match="forces are in F0"):
-        read(file, columns=columns)
+    with pytest.raises(UserError, match=r"'soleus_r\.active_fiber_force_multiplier' is 300 F0"):
+        read(file, columns=columns, f0=None)
 
 
 @pytest.mark.parametrize("name", ["norm_fiber_length", "soleus/normFiberLength", "fiber_strain"])

@@ -223,10 +223,11 @@ def _calcium(made: Proposal, reader: Reader, found: Recognition) -> bool:
 def _reference(made: Proposal, found: Recognition, facts: Mapping[str, str], change: bool) -> None:
     one = found.roles.get("length")
     kind = UNITS[one.unit].kind if one is not None and one.unit else ""
-    if kind == "relative length":
-        return
     if "reference_length" in facts:
         made.add(0, f"reference_length: {scalar(facts['reference_length'])}", "as the file tells")
+    elif kind == "relative length":
+        told = "may be filled in: how long one L0 is, for example '1.2 mm'; the bag has 1 m for it else"
+        made.add(0, "reference_length:", told, active=False)
     elif "length" in found.factors:
         made.add(0, f"reference_length: {found.factors['length']:.9g} m", "from length in both units")
     elif change and kind == "length":
@@ -237,10 +238,14 @@ def _reference(made: Proposal, found: Recognition, facts: Mapping[str, str], cha
 
 def _f0(made: Proposal, reader: Reader, found: Recognition, facts: Mapping[str, str]) -> None:
     one = found.roles.get("force")
-    if one is None or (one.unit and UNITS[one.unit].kind == "relative force"):
+    if one is None:
         return
-    if "f0" in facts:
+    relative = bool(one.unit) and UNITS[one.unit].kind == "relative force"
+    if "f0" in facts and (not relative or UNITS[facts["f0"].split()[-1]].kind == "force"):
         made.add(0, f"f0: {scalar(facts['f0'])}", "as the file tells")
+    elif relative:
+        told = "may be filled in: the force that one F0 is, for example '0.5 mN'; the bag has 1 N for it else"
+        made.add(0, "f0:", told, active=False)
     elif "force" in found.factors:
         made.add(0, f"f0: {found.factors['force']:.9g} N", "from force in both units")
     elif "f0" in reader.defaults:

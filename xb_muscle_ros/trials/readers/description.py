@@ -85,11 +85,12 @@ class ImportMapping:
         length_is_change: the length column holds the change from the reference length.
         length_of: what the length column is the length of, one of `LENGTHS_OF`; lengths of sarcomeres and halves of
             them are stored relative to L0 = 1 m.
-        reference_length: the length that is L0; None for the mean of the first isometric samples.
+        reference_length: the length that is L0; None for the mean of the first isometric samples, or 1 m where
+            lengths are in L0.
         at_reference: what the length column reads where the fibre has its reference length; None for that length.
         largest_step_s: samples may be this far apart, s; None for what a muscle's record usually has.
         servo_give: length changes up to this that come back are none: the motor gave under the muscle's force.
-        f0: the force or stress that is F0.
+        f0: the force or stress that is F0; None for 1 N where forces are in F0.
         f0_at_pca: F0 is the initial isometric force of the trial at this pCa in the same folder; None where not.
         f0_note: where F0 comes from, where that was found out rather than given.
         force_zero_from_slack: force is zero while the fibre is slack after a release.
@@ -142,6 +143,11 @@ class ImportMapping:
     reference_note: str = "given"
     own_keys: frozenset[str] = frozenset()
     sure: frozenset[str] = frozenset()
+
+    @property
+    def l0_is_a_length(self) -> bool:
+        """Whether L0 is so many metres, rather than what a record in L0 counts in."""
+        return self.length.unit.kind == "length" or self.reference_length is not None
 
     @property
     def columns(self) -> dict[str, Column]:

@@ -75,7 +75,9 @@ def read_force(
         draft.notes.append(f"stress divided by F0 = {f0.value:.6g} Pa{mapping.f0_note}, stored with 1 N for F0")
     else:
         f0_n = f0.value
-        draft.notes.append(f"F0 = {f0_n:.6g} N{mapping.f0_note}")
+        relative = mapping.force.unit.kind == "relative force"
+        force = force * (f0_n if relative else 1.0)
+        draft.notes.append(f"{'forces come relative to ' * relative}F0 = {f0_n:.6g} N{mapping.f0_note}")
     remedy = f"check its unit ({mapping.force.unit_name}) and f0"
     signal.check(where, force / f0_n, FORCE_RANGE_F0, "{:.6g} F0", remedy)
     if scaling or (scaling is None and mapping.isometric_fractions):

@@ -40,7 +40,13 @@ def scaled(signal: Signal, key: str, unit: str, column: Column, mapping: ImportM
         if volts := volts_of(unit, key):
             remedy += f", as {calibration(key, volts)}"
         raise UserError(f"{path}, {signal.name} {found}; known: {', '.join(known)}; {remedy}, or name another column")
-    own = unit_of(unit_in(unit, key) or unit, key, str(path))
+    plain = unit_in(unit, key) or unit
+    own = unit_of(plain, key, str(path))
+    if not told and own.kind != column.unit.kind:
+        raise UserError(
+            f"{path}, {signal.name} is in {unit} by the file, which is a {own.kind}; give it as {PREFIX}{key}.unit or "
+            f"--{key}-unit {plain}"
+        )
     if told and column.unit != own:
         raise UserError(
             f"{path}, {signal.name} is in {unit} by the file, in {column.unit_name} by {mapping.where}; leave "
@@ -71,26 +77,26 @@ def with_facts(
         UserError: a unit that is not known, F0 that no muscle has, or neither header nor mapping tells what is needed.
     """
     name, length = reference
-    if (
-        "reference_length" not in mapping.own_keys
-        and mapping.length.unit.kind == "length"
-        and mapping.length_of == "fibre"
-    ):
+    if "reference_length" not in mapping.own_keys and mapping.length_of == "fibre":
         if length is not None and is_told(length):
             found = Quantity(length.value * unit_of(length.unit, "length", f"{path}: {name}").factor, "length")
             mapping = replace(mapping, reference_length=found, reference_note=f"{name} of the header")
-        elif mapping.length_is_change or mapping.at_reference is not None:
+        elif mapping.length.unit.kind == "length" and (mapping.length_is_change or mapping.at_reference is not None):
             raise UserError(
                 f"{path}: {_missing(name, length)}, and the length column holds a change, so the reference length has "
                 "to be given, for example 'reference_length: 42.8 mm' or --reference-length '42.8 mm'"
             )
     name, force = f0
-    if mapping.force is None or mapping.force.unit.kind == "relative force" or "f0" in mapping.own_keys:
+    if mapping.force is None or "f0" in mapping.own_keys:
         return mapping
     if force is None or not is_told(force):
+        if mapping.force.unit.kind == "relative force":
+            return mapping
         raise UserError(f"{path}: {_missing(name, force)}, so f0 is needed, for example 'f0: 100 mN' or --f0 '100 mN'")
     unit = unit_of(force.unit, "force", f"{path}: {name}")
     given = Quantity(force.value * unit.factor, unit.kind)
+    if mapping.force.unit.kind == "relative force" and given.kind != "force":
+        return mapping
     for fault in f0_faults(given, mapping.force):
         raise UserError(f"{path}: {name} of the header: {fault}")
     return replace(mapping, f0=given, f0_note=f", {name} of the header")

@@ -10,7 +10,13 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.phases import detect_phases, initial_isometric
 from xb_muscle_ros.trials.readers.base import Draft
 from xb_muscle_ros.trials.readers.description import ImportMapping
-from xb_muscle_ros.trials.readers.plausibility import SPIKE_L0, sarcomere_hint, warn_of_length, warn_of_spikes
+from xb_muscle_ros.trials.readers.plausibility import (
+    SPIKE_L0,
+    doubt_of_l0,
+    sarcomere_hint,
+    warn_of_length,
+    warn_of_spikes,
+)
 from xb_muscle_ros.trials.trial import Array, Phase
 
 # Beyond these it is no muscle's length, or its unit is wrong. A whole muscle may go slack, its length near 0.
@@ -35,12 +41,15 @@ def read_length(draft: Draft, time_s: Array) -> Length:
         UserError: a length that no muscle has.
     """
     mapping, signal, facts = draft.mapping, draft.recording.signals["length"], draft.recording.facts
-    length_m = signal.values * mapping.length.unit.factor
-    relative = mapping.length.unit.kind == "relative length"
-    reference_m = 1.0 if relative else None if mapping.reference_length is None else mapping.reference_length.value
+    reference_m = None if mapping.reference_length is None else mapping.reference_length.value
+    unit_m = 1.0
+    if mapping.length.unit.kind == "relative length":
+        reference_m = unit_m = 1.0 if reference_m is None else reference_m
+    length_m = signal.values * mapping.length.unit.factor * unit_m
     if reference_m is not None and (mapping.length_is_change or mapping.at_reference is not None):
-        length_m = length_m - (0.0 if mapping.at_reference is None else mapping.at_reference.value) + reference_m
-    give = 0.0 if mapping.servo_give is None else mapping.servo_give.value
+        at_m = 0.0 if mapping.at_reference is None else mapping.at_reference.value * unit_m
+        length_m = length_m - at_m + reference_m
+    give = 0.0 if mapping.servo_give is None else mapping.servo_give.value * unit_m
     phases = detect_phases(time_s, length_m, facts.get("amplitude_l0"), facts.get("recovery_s"), reference_m, give)
     how = mapping.reference_note
     if reference_m is None:
@@ -68,9 +77,9 @@ def _check(draft: Draft, length_m: Array, reference_m: float) -> None:
         )
     is_fibre = mapping.length_of == "fibre"
     low, high = L0_RANGE_M if is_fibre else SARCOMERE_RANGE_M
-    if mapping.length.unit.kind == "length" and not low <= reference_m <= high:
+    if mapping.l0_is_a_length and not low <= reference_m <= high:
         what = "fibres" if is_fibre else "sarcomeres and their halves"
-        hint = (is_fibre and sarcomere_hint(reference_m)) or f"is {mapping.length.unit_name} its unit?"
+        hint = (is_fibre and sarcomere_hint(reference_m)) or doubt_of_l0(mapping)
         raise UserError(f"{where}, {signal.name}: L0 is {reference_m:.6g} m; {what} have {low:g} to {high:g} m; {hint}")
     shown = f"{{:.6g}} L0 (L0 = {reference_m:.6g} m)"
     signal.check(where, length_m / reference_m, LENGTH_RANGE_L0, shown, "check the column and its unit")
@@ -79,6 +88,8 @@ def _check(draft: Draft, length_m: Array, reference_m: float) -> None:
 def _note(mapping: ImportMapping, reference: str) -> str:
     """What lengths mean, given L0 and how it was found."""
     if mapping.length.unit.kind == "relative length":
+        if mapping.reference_length is not None:
+            return f"lengths come relative to L0 = {reference}"
         return "lengths come relative to L0 and are stored with 1 m for L0"
     if mapping.length_of != "fibre":
         return f"{mapping.length_of.replace('_', '-')} lengths relative to {reference}, stored with 1 m for L0"

@@ -124,6 +124,11 @@ def build_mapping(
             "'change', where 0 V is the reference length, or 'absolute', where it is no length at all, or give what "
             "the column reads at the reference length by columns.length.at_reference, for example '2.5 V'"
         )
+    if from_start and length.unit.kind == "relative length":
+        raise UserError(
+            f"{where}: lengths are in {length.unit_name}, so 'reference_length: {FIRST_ISOMETRIC}' has no use; leave "
+            "it out, or give how long one L0 is, for example '42.8 mm'"
+        )
     units = (_length_faults(made, in_header), _force_faults(made, in_header))
     for fault in itertools.chain(*units, _calcium_faults(made), _pattern_faults(made)):
         raise UserError(f"{where}: {fault}")
@@ -183,8 +188,8 @@ def _length_faults(made: ImportMapping, in_header: Collection[str]) -> Iterator[
     relative = kind == "relative length"
     if at is not None and at.kind != kind:
         yield f"columns.length.at_reference has to be a {kind}, as the column is"
-    if relative and reference is not None:
-        yield f"lengths are in {unit}, so reference_length has no use; leave it out"
+    if relative and reference is not None and made.length_of != "fibre":
+        yield f"{made.length_of} lengths are in {unit}, so reference_length has no use; leave it out"
     unknown = reference is None and "reference_length" not in in_header
     if (made.length_is_change or at is not None) and not relative and unknown:
         what = f"a change in {unit}" if made.length_is_change else "that of more than the fibre"
@@ -202,14 +207,15 @@ def _length_faults(made: ImportMapping, in_header: Collection[str]) -> Iterator[
 
 def _force_faults(made: ImportMapping, in_header: Collection[str]) -> Iterator[str]:
     force, f0 = made.force, made.f0
-    if force is None or force.unit.kind == "relative force":
+    if force is None:
         if f0 is not None or made.f0_at_pca is not None:
-            why = "there is no force column" if force is None else f"forces are in {force.unit_name}"
-            yield f"{why}, so f0 has no use; leave it out"
+            yield "there is no force column, so f0 has no use; leave it out"
         return
-    unit = force.unit_name
+    unit, relative = force.unit_name, force.unit.kind == "relative force"
+    if relative and made.f0_at_pca is not None:
+        yield f"forces are in {unit}, so f0.isometric_at_pca has no use; leave it out, or give a force such as '0.9 mN'"
     if f0 is None:
-        if made.f0_at_pca is None and "f0" not in in_header:
+        if not relative and made.f0_at_pca is None and "f0" not in in_header:
             yield f"forces are in {unit}, so f0 is needed, for example 'f0: 100 {unit}' or --f0 '100 {unit}'"
         return
     yield from f0_faults(f0, force)
@@ -217,7 +223,13 @@ def _force_faults(made: ImportMapping, in_header: Collection[str]) -> Iterator[s
 
 def f0_faults(f0: Quantity, force: Column) -> Iterator[str]:
     """What is wrong with F0 for a column of force."""
-    if f0.kind != force.unit.kind:
+    if force.unit.kind == "relative force" and f0.kind != "force":
+        yield (
+            f"forces are in {force.unit_name} and f0 is a {f0.kind}, which has no use; leave it out, or give the force "
+            "that is F0, for example '0.9 mN'"
+        )
+        return
+    if f0.kind != force.unit.kind and force.unit.kind != "relative force":
         yield f"f0 is a {f0.kind}, the force column a {force.unit.kind}; give f0 in {force.unit_name}"
         return
     low, high, unit = F0_RANGES[f0.kind]

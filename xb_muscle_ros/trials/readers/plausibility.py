@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from xb_muscle_ros.trials.readers.base import Draft, Signal
+from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.trial import Array
 
 # Isometric stress of muscle at full activation, weak to strong, Pa.
@@ -50,11 +51,18 @@ def warn_of_length(draft: Draft, length_m: Array, reference_m: float) -> None:
                 f"the length at rest is {1e6 * reference_m:.3g} µm; a {_words(mapping.length_of)} has "
                 f"{1e6 * own[0]:g} to {1e6 * own[1]:g} µm; {why}"
             )
-    elif mapping.length.unit.kind == "length":
-        _usual(draft, reference_m, USUAL_L0_M, f"L0 is {reference_m:.6g} m", f"is {unit} its unit?", " m")
+    elif mapping.l0_is_a_length:
+        _usual(draft, reference_m, USUAL_L0_M, f"L0 is {reference_m:.6g} m", doubt_of_l0(mapping), " m")
     middle = float(np.median(length_m)) / reference_m
     found = f"the median length is {middle:.3g} L0 (L0 = {reference_m:.6g} m)"
     _usual(draft, middle, USUAL_LENGTH_L0, found, "check the reference length and the unit of length")
+
+
+def doubt_of_l0(mapping: ImportMapping) -> str:
+    """What to look at where L0 is no usual length."""
+    if mapping.length.unit.kind == "relative length":
+        return "is the reference length right?"
+    return f"is {mapping.length.unit_name} its unit?"
 
 
 def sarcomere_hint(reference_m: float) -> str:
@@ -126,21 +134,21 @@ def warn_of_f0(draft: Draft, f0_n: float, reference_m: float) -> None:
         pa = mapping.f0.value
         _usual(draft, pa, USUAL_F0_PA, f"F0 is {pa:.6g} Pa", f"is {unit} its unit?", " Pa")
         return
-    if mapping.length.unit.kind != "length" or mapping.length_of != "fibre":
+    if not mapping.l0_is_a_length or mapping.length_of != "fibre":
         return
+    doubt = "is f0 right" if mapping.force.unit.kind == "relative force" else f"is {unit} the unit of force and f0"
     weak, strong = STRESS_PA
     least_m, most_m = (2.0 * math.sqrt(f0_n / (math.pi * stress)) for stress in (strong, weak))
     widest = next(ratio for longest_m, ratio in WIDEST_L0 if reference_m <= longest_m)
     if least_m > widest * reference_m:
         draft.warn(
             f"F0 = {f0_n:.6g} N takes a cross-section {1e3 * least_m:.3g} mm wide even at {strong / 1e3:g} kPa, with "
-            f"L0 = {1e3 * reference_m:.4g} mm; is {unit} the unit of force and f0 (or {mapping.length.unit_name} that "
-            "of length)?"
+            f"L0 = {1e3 * reference_m:.4g} mm; {doubt} (or {mapping.length.unit_name} the unit of length)?"
         )
     elif most_m < THINNEST_M:
         draft.warn(
             f"F0 = {f0_n:.6g} N takes a cross-section {1e6 * most_m:.3g} µm wide even at {weak / 1e3:g} kPa, thinner "
-            f"than a myofibril; is {unit} the unit of force and f0?"
+            f"than a myofibril; {doubt}?"
         )
 
 

@@ -25,7 +25,7 @@ from xb_muscle_ros.trials.readers.tree import Keys, dotted_keys, merged
 from xb_muscle_ros.trials.readers.units import Quantity
 
 # Raised when the same file and mapping would make another trial than before.
-VERSION = 2
+VERSION = 3
 # Mappings, and F0 of preparations, that are kept: files come kind by kind and folder by folder.
 _KEPT = 64
 _SAME_PCA = 1e-6
