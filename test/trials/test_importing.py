@@ -16,6 +16,7 @@ from scipy.io import savemat
 from xb_muscle_ros.trials import importing
 from xb_muscle_ros.trials.bag_files import clear_leftovers
 from xb_muscle_ros.trials.bags import find_bags, read_trial, write_trial
+from xb_muscle_ros.trials.completing import Known
 from xb_muscle_ros.trials.importing import (
     Failed,
     FileDone,
@@ -28,6 +29,7 @@ from xb_muscle_ros.trials.importing import (
     recorded_provenance,
 )
 from xb_muscle_ros.trials.readers.settings import ImportSettings
+from xb_muscle_ros.trials.study import read_study
 from xb_muscle_ros.trials.trial import Phase, Trial, TrialFacts
 
 TREE: dict[str, Any] = {
@@ -298,3 +300,62 @@ def test_memory_of_an_import_is_that_of_its_samples(tmp_path: Path) -> None:
 
     more = peak_bytes(800_000) - peak_bytes(400_000)
     assert more < 400_000 * 100
+
+
+TIME_S = np.arange(1200) / 1000
+CORNERS_S = [0.4, 0.48, 0.56, 0.66, 0.74]
+QUIET = np.full(TIME_S.size, 0.4)
+
+
+def _stretches(amplitude: float) -> np.ndarray:
+    return 1.0 + np.interp(TIME_S, CORNERS_S, np.array([0.0, 1.0, 0.0, 0.0, 1.0]) * amplitude)
+
+
+def _artefact(force_f0: float) -> np.ndarray:
+    return np.where((TIME_S >= 0.2) & (TIME_S < 0.22), force_f0, QUIET)
+
+
+@pytest.mark.parametrize(
+    ("length", "force", "keys", "words"),
+    [
+        (_stretches(0.6), QUIET, {}, ""),
+        (_stretches(0.6), QUIET, {"amplitude_l0": 0.58}, ""),
+        (_stretches(0.04), _artefact(-1.9), {}, ""),
+        (
+            _stretches(0.04),
+            _artefact(-2.78),
+            {},
+            "line 202, column 'f' is -2.78 F0; allowed is -2 to 10; check its unit",
+        ),
+        (_stretches(0.04), _artefact(16.7), {}, "column 'f' is 16.7 F0; allowed is -2 to 10"),
+        (1.0 + 1.2 * np.clip(TIME_S, 0.0, 1.0), QUIET, {}, "is 2.0008 L0 (L0 = 1 m); allowed is 0.1 to 2"),
+        (_stretches(0.04), QUIET, {"pca": 1.5}, "pca is 1.5; allowed is 2 to 12"),
+        (_stretches(0.04), QUIET, {"amplitude_l0": 4.0}, "amplitude_l0 is 4; allowed is 0 to 0.5: amplitudes are frac"),
+        (_stretches(0.04), QUIET, {"recovery_s": 0.2}, "recovery_s is 0.2 s, but the recovery at 0.5600 s has 0.1 s"),
+        (_stretches(0.0), QUIET, {"amplitude_l0": 0.7}, "amplitude_l0 is 0.7; allowed is 0 to 0.5"),
+    ],
+)
+def test_what_no_command_takes_is_not_imported_and_what_is_imported_is_taken(
+    tmp_path: Path, length: np.ndarray, force: np.ndarray, keys: dict[str, Any], words: str
+) -> None:
+    rows = [f"{t:.3f},{x:.6f},{f:.6f}" for t, x, f in zip(TIME_S, length, force, strict=True)]
+    (tmp_path / "a.csv").write_text("\n".join(("t,l,f", *rows)))
+    event, _ = _run([tmp_path / "a.csv"], tmp_path / "bags", **keys)
+    if words:
+        assert isinstance(event, Failed)
+        assert words in event.why
+        return
+    assert isinstance(event, Imported)
+    (trial,) = read_study([event.bag], "f1", Known()).trials
+    assert trial.facts.amplitude_l0 == pytest.approx(event.trial.facts.amplitude_l0)
+
+
+def test_calcium_that_no_command_takes_is_not_imported(tmp_path: Path) -> None:
+    rows = [f"{i / 1000},1.0,0.4,{1.2e4}" for i in range(20)]
+    (tmp_path / "a.csv").write_text("\n".join(("t,l,f,ca", *rows)))
+    columns = {**TREE["columns"], "calcium": {"column": "ca", "unit": "uM"}}
+    tree = {key: value for key, value in TREE.items() if key != "pca"}
+    settings = ImportSettings({**tree, "columns": columns}, "here")
+    event, _ = import_recordings([tmp_path / "a.csv"], settings, tmp_path / "bags")
+    assert isinstance(event, Failed)
+    assert "is 12000 µM; allowed is 0 to 10000" in event.why

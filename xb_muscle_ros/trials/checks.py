@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,17 +36,27 @@ _RELAXED_PCA = 8.0
 _GAP_S = 0.01
 # What length changes by across a gap that can be lived with, L0.
 _ACROSS_L0 = 5e-3
-# Amplitudes are fractions of L0, and facts are as much as this off what phases have, where these can be seen.
+# Amplitudes are fractions of L0: larger ones are those that the lengths show. Facts are as much as this off what phases
+# have, where these can be seen.
 _AMPLITUDE_L0 = 0.5
 _PERCENT = 0.25
 _SHORTEST_COMPARED_S, _SMALLEST_COMPARED_L0 = 0.02, 0.01
 
 
+class Belied(NamedTuple):
+    """A fact by its name that the lengths belie: in what, and what to do about it."""
+
+    name: str
+    what: str
+    remedy: str
+
+
 def check_values(trial: Trial, where: str, f0_is_known: bool = True, pca_is_known: bool = True) -> tuple[str, ...]:
-    """Refuse a trial whose values make no sense; say what is unusual.
+    """Refuse the trial of a bag whose values make no sense; say what is unusual.
 
     Args:
         trial: with all facts.
+        where: the bag, for messages.
         f0_is_known: whether bag, fibre file or user tell F0; else 1 N is taken for it.
         pca_is_known: whether the bag tells pCa; else calcium alone does.
 
@@ -53,22 +64,33 @@ def check_values(trial: Trial, where: str, f0_is_known: bool = True, pca_is_know
         Lines on lengths and forces that are far from L0 and F0, and on gaps.
 
     Raises:
+        UserError: see `unusual`.
+    """
+    with naming(f"bag {where}"):
+        lines = unusual(trial, f0_is_known, pca_is_known)
+    return tuple(f"bag {where}: {line}" for line in lines)
+
+
+def unusual(trial: Trial, f0_is_known: bool = True, pca_is_known: bool = True) -> list[str]:
+    """What is unusual about a trial that makes sense; the arguments are those of `check_values`.
+
+    Raises:
         UserError: length, force or calcium are in another unit than their topic or fact has, pCa is contrary to
             calcium, amplitude or recovery to length, or samples are too few or missing while length changes.
     """
-    with naming(f"bag {where}"):
-        _check_samples(trial)
-        _check_calcium(trial)
-        lines = [*_length(trial), *_force(trial, f0_is_known), *_median_force(trial, pca_is_known)]
-        lines += [*_gaps(trial), *_cover(trial)]
-        _check_stated_facts(trial)
-    return tuple(f"bag {where}: {line}" for line in lines)
+    _check_samples(trial)
+    _check_calcium(trial)
+    lines = [*_length(trial), *_force(trial, f0_is_known), *_median_force(trial, pca_is_known)]
+    lines += [*_gaps(trial), *_cover(trial)]
+    for fact in belied(trial):
+        raise UserError(f"{fact.what}; {fact.remedy}")
+    return lines
 
 
 def _check_samples(trial: Trial) -> None:
     for what, samples in (("length", trial.time_s.size), ("measured force", trial.force_time_s.size)):
         if samples < LEAST_SAMPLES and (samples or what == "length"):
-            raise UserError(f"there are {samples} samples of {what}; needed are {LEAST_SAMPLES}; leave the bag out")
+            raise UserError(f"there are {samples} samples of {what}; needed are {LEAST_SAMPLES}; leave it out")
 
 
 def _length(trial: Trial) -> Iterator[str]:
@@ -157,22 +179,20 @@ def _cover(trial: Trial) -> Iterator[str]:
         )
 
 
-def _check_stated_facts(trial: Trial) -> None:
-    """Refuse amplitude and recovery in another unit, or of another trial than the lengths."""
+def belied(trial: Trial) -> Iterator[Belied]:
+    """Stated amplitude and recovery that are in another unit, or of another trial than the lengths."""
     facts = trial.facts
     amplitude, recovery = facts.amplitude_l0, facts.recovery_s
-    if amplitude is not None and not 0.0 <= amplitude <= _AMPLITUDE_L0:
-        raise UserError(
-            f"amplitude_l0 is {amplitude:g}; allowed is 0 to {_AMPLITUDE_L0:g}: amplitudes are fractions "
-            "of L0, not percent"
-        )
     phases = {name: phase for name, phase in trial.phases_by_name().items() if _is_recorded(trial, phase)}
     stretch, rest = phases.get("conditioning_stretch"), phases.get("recovery")
-    if amplitude is not None and stretch is not None and amplitude >= _SMALLEST_COMPARED_L0:
-        at = np.interp([stretch.start_s, stretch.end_s], trial.time_s, trial.length_change_l0)
-        _compare(float(at[1] - at[0]), amplitude, "amplitude_l0", "L0", stretch)
+    shown = None if stretch is None else _amplitude(trial, stretch)
+    if amplitude is not None and not 0.0 <= amplitude <= _AMPLITUDE_L0 and (shown is None or _apart(shown, amplitude)):
+        allowed = f"allowed is 0 to {_AMPLITUDE_L0:g}: amplitudes are fractions of L0, not percent"
+        yield Belied("amplitude_l0", f"amplitude_l0 is {amplitude:g}", allowed)
+    elif amplitude is not None and stretch is not None and shown is not None and amplitude >= _SMALLEST_COMPARED_L0:
+        yield from _compared(shown, amplitude, "amplitude_l0", "L0", stretch)
     if recovery is not None and rest is not None and rest.end_s - rest.start_s >= _SHORTEST_COMPARED_S:
-        _compare(rest.end_s - rest.start_s, recovery, "recovery_s", "s", rest)
+        yield from _compared(rest.end_s - rest.start_s, recovery, "recovery_s", "s", rest)
 
 
 def _is_recorded(trial: Trial, phase: Phase) -> bool:
@@ -180,9 +200,20 @@ def _is_recorded(trial: Trial, phase: Phase) -> bool:
     return bool(trial.time_s[0] <= phase.start_s and phase.end_s <= trial.time_s[-1])
 
 
-def _compare(found: float, stated: float, name: str, unit: str, phase: Phase) -> None:
-    if abs(found - stated) > _PERCENT * abs(found):
-        raise UserError(
+def _amplitude(trial: Trial, stretch: Phase) -> float:
+    """What a stretch lengthens by, L0."""
+    at = np.interp([stretch.start_s, stretch.end_s], trial.time_s, trial.length_change_l0)
+    return float(at[1] - at[0])
+
+
+def _apart(found: float, stated: float) -> bool:
+    return abs(found - stated) > _PERCENT * abs(found)
+
+
+def _compared(found: float, stated: float, name: str, unit: str, phase: Phase) -> Iterator[Belied]:
+    if _apart(found, stated):
+        what = (
             f"{name} is {stated:g} {unit}, but the {phase.name.replace('_', ' ')} at {phase.start_s:.4f} "
-            f"s has {found:.4g} {unit}; correct the one that is wrong"
+            f"s has {found:.4g} {unit}"
         )
+        yield Belied(name, what, "correct the one that is wrong")

@@ -136,7 +136,9 @@ def test_lost_samples_are_named_with_their_time(tmp_path: Path) -> None:
     why = refusal(path, tmp_path)
     assert "message 100, header stamp of /joints: samples are missing from 0.099 to 0.35 s (0.251 s)" in why
     allowed = tree(time={"stamp": "header", "largest_step": "0.3 s"})
-    assert trial(path, tmp_path, allowed).time_s.size == 150
+    assert "and changes by 0.0333 L0 within; record it again or cut the trial there" in refusal(path, tmp_path, allowed)
+    still = write(tmp_path / "still", [row for row in rig(800) if not 0.2995 < row[1] < 0.5495])
+    assert trial(still, tmp_path, allowed).time_s.size == 550
 
 
 def test_lost_forces_are_named_too(tmp_path: Path) -> None:

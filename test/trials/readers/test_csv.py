@@ -143,8 +143,8 @@ def test_amplitude_and_recovery_are_measured_where_not_given(tmp_path: Path) -> 
     facts = read_csv(path, _mapping("L0", "F0")).facts
     assert facts.amplitude_l0 == pytest.approx(0.02, abs=1e-4)
     assert facts.recovery_s == pytest.approx(0.1, abs=1e-4)
-    facts = read_csv(path, _mapping("L0", "F0", amplitude_l0=0.0383, recovery_s=0.316)).facts
-    assert (facts.amplitude_l0, facts.recovery_s) == (0.0383, 0.316)
+    facts = read_csv(path, _mapping("L0", "F0", amplitude_l0=0.0203, recovery_s=0.116)).facts
+    assert (facts.amplitude_l0, facts.recovery_s) == (0.0203, 0.116)
 
 
 def test_negative_times_are_shifted_and_told(tmp_path: Path) -> None:
@@ -244,7 +244,7 @@ def test_without_calcium_there_is_no_trial(tmp_path: Path) -> None:
 
 
 def test_an_absurd_pca_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="pca is 61; allowed is 1 to 12"):
+    with pytest.raises(UserError, match="pca is 61; allowed is 2 to 12"):
         read_csv(_file(tmp_path, TIME_S, 1 + STRAIN, FORCE), _mapping("L0", "F0", pca=61))
 
 

@@ -262,6 +262,8 @@ def test_a_protocol_that_is_not_in_the_record_is_told(tmp_path: Path) -> None:
     late = tuple((t + 30.0 * (t == 660.0), function, options) for t, function, options in PROTOCOL)
     trial = read(dat(tmp_path / "a.dat", protocol=late))
     assert any("shows the test stretch at 0.66 s; the file tells of one at 0.69 s" in line for line in trial.warnings)
+    assert any("recovery_s is 0.13 s, but the recovery" in line for line in trial.warnings)
+    assert trial.facts.recovery_s == pytest.approx(0.1, abs=1e-4)
 
 
 def test_a_bath_that_is_changed_within_the_record_is_told(tmp_path: Path) -> None:

@@ -49,7 +49,7 @@ def test_a_fibre_as_it_should_be_gets_none(tmp_path: Path) -> None:
         ({"time": (100 * TIME_S, "s")}, {}, "samples are 0.1 s apart (10 Hz)"),
         ({"time": (10 * TIME_S, "ms")}, {}, "samples are 1e-05 s apart (1e+05 Hz)"),
         ({"calcium": (np.full(N, 1e-6), "uM")}, {"pca": None}, "calcium goes up to 1e-06 µM (pCa 12)"),
-        ({"calcium": (np.full(N, 3e4), "uM")}, {"pca": None}, "usual is pCa 3 to 10; is uM its unit?"),
+        ({"calcium": (np.full(N, 3e3), "uM")}, {"pca": None}, "usual is pCa 3 to 10; is uM its unit?"),
         ({}, {"reference_length": "3 mm"}, "the median length is 0.41"),
         ({"force": (-FORCE, "mN")}, {}, "is its sign reversed"),
         ({"force": (10 * FORCE, "mN")}, {}, "are f0 and the unit of force (mN) right?"),
@@ -130,7 +130,7 @@ def test_a_sarcomere_taken_for_a_fibre_is_refused_with_the_option(tmp_path: Path
 
 
 def test_concentrations_in_a_column_of_pca_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="is pCa 30; allowed is 1 to 12; is it a concentration"):
+    with pytest.raises(UserError, match="is pCa 30; allowed is 2 to 12; is it a concentration"):
         warnings(tmp_path, {"calcium": (np.full(N, 30.0), "pCa")}, pca=None)
 
 

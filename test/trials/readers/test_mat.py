@@ -130,8 +130,8 @@ def _changed(name: str, index: tuple[Any, ...], value: float) -> dict[str, Any]:
         (_changed("texp", (5, 1, 1, 2), -0.6), "sample 6, texp: -0.05 s does not come after 0.004 s"),
         (_changed("texp", (slice(None), 1, 1, 2), np.nan), "texp has no samples"),
         (_changed("pCas", (1,), np.nan), "pCas(2) is nan; needed is a number"),
-        (_changed("pCas", (1,), 61.0), "pca is 61; allowed is 1 to 12"),
-        (_changed("Fexp", (7, 1, 1, 2), 500.0), "sample 8, Fexp is 500 F0; allowed is -20 to 20"),
+        (_changed("pCas", (1,), 61.0), "pca is 61; allowed is 2 to 12"),
+        (_changed("Fexp", (7, 1, 1, 2), 500.0), "sample 8, Fexp is 500 F0; allowed is -2 to 10"),
         (_changed("Lexp", (7, 1, 1, 2), 38.3), "sample 8, Lexp is 39.3 L0"),
     ],
 )

@@ -147,3 +147,14 @@ def test_what_only_tables_have_is_refused_elsewhere(tmp_path: Path, keys: dict[s
     (tmp_path / "a.slc").write_text("SLCONTROL_DATA_FILE")
     with pytest.raises(MappingError, match=r"(columns\.trial|decimal) is for .*xlsx, csv, the file is slc; leave it"):
         ImportSettings(keys, "here").prepare(tmp_path / "a.slc")
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("kPa", 1e3), ("N", 1.0)])
+def test_f0_of_a_folder_may_be_any_stress_or_force(tmp_path: Path, unit: str, factor: float) -> None:
+    rows = "\n".join(f"{i / 1000},1,90" for i in range(100))
+    file = _file(tmp_path, content=f"t,l,f\n{rows}\n".encode())
+    columns = {**TREE["columns"], "force": {"column": "f", "unit": unit}}
+    tree = {**TREE, "columns": columns, "f0": {"isometric_at_pca": 4.5}, "pca": 4.5, "per_file": []}
+    mapping = ImportSettings(tree, "here").prepare(file).mapping
+    assert mapping.f0 is not None
+    assert mapping.f0.value == pytest.approx(90.0 * factor)

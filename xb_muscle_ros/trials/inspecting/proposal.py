@@ -14,6 +14,7 @@ from xb_muscle_ros.trials.inspecting.mapping_text import Proposal, scalar
 from xb_muscle_ros.trials.inspecting.names import NamePattern, name_pattern
 from xb_muscle_ros.trials.inspecting.recognition import Recognised, Recognition, unrecognised
 from xb_muscle_ros.trials.readers.base import Reader
+from xb_muscle_ros.trials.readers.calcium import PCA_RANGE
 from xb_muscle_ros.trials.readers.columns import BAG
 from xb_muscle_ros.trials.readers.contents import Content, Contents
 from xb_muscle_ros.trials.readers.description import name_of
@@ -276,7 +277,12 @@ def _facts(made: Proposal, facts: Mapping[str, str], pattern: NamePattern | None
             made.add(1, f"factors: {{{', '.join(f'{key}: {value:g}' for key, value in pattern.factors.items())}}}")
         made.guesses.append(f"{told}: as the file's name tells")
     else:
-        made.fill_in(0, "pca", "-log10 of free calcium in M, 1 to 12; or columns.calcium, or activation by stimulation")
+        made.fill_in(
+            0,
+            "pca",
+            f"-log10 of free calcium in M, {PCA_RANGE[0]:g} to {PCA_RANGE[1]:g}; or columns.calcium, or activation by "
+            "stimulation",
+        )
         made.add(0, "activation: {rest: 0.05 uM, tetanus: 8 uM, rise: 50 ms, decay: 30 ms, begin: 1 s, end: 2 s}",
                  "stimulated muscle, in place of pca; examples; begin and end only without columns.stimulation",
                  active=False)  # fmt: skip

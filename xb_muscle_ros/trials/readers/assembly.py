@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from xb_muscle_ros.errors import UserError, naming
+from xb_muscle_ros.trials.checks import belied, unusual
 from xb_muscle_ros.trials.mains import hum_line, notched
 from xb_muscle_ros.trials.phases import conditioning
 from xb_muscle_ros.trials.readers.base import Draft, Recording, Signal
@@ -23,10 +26,22 @@ from xb_muscle_ros.trials.trial import Array, Trial, TrialFacts
 
 # The test stretch may begin this much later or earlier than the file tells, s.
 ONSET_TOLERANCE_S = 0.005
-FACT_RANGES = {"pca": PCA_RANGE, "amplitude_l0": (0.0, 1.0), "recovery_s": (0.0, 1e4)}
+FACT_RANGES = {"pca": PCA_RANGE, "recovery_s": (0.0, 1e4)}
 
 
 def trial_of(recording: Recording, mapping: ImportMapping, path: Path, isometric_scaling: bool | None = None) -> Trial:
+    """Make a trial that every command takes; see `made_of`.
+
+    Raises:
+        UserError: see `made_of`, or a command would refuse the trial, see `checks.unusual`.
+    """
+    trial = made_of(recording, mapping, path, isometric_scaling)
+    with naming(recording.where):
+        unusual(trial)
+    return trial
+
+
+def made_of(recording: Recording, mapping: ImportMapping, path: Path, isometric_scaling: bool | None = None) -> Trial:
     """Make a trial.
 
     Lengths in m stay as they are and ``reference_length_m`` tells L0; lengths in L0 and half-sarcomere lengths are
@@ -87,12 +102,25 @@ def trial_of(recording: Recording, mapping: ImportMapping, path: Path, isometric
         force_time_s=settle(force.time_s),
         force_n=settle(force.force_n),
     )
+    trial = _with_shown_facts(draft, trial, path, {"amplitude_l0": amplitude_l0, "recovery_s": recovery_s})
     if mapping.notch_hz:
         with naming(draft.where):
             trial = notched(trial, mapping.notch_hz)
     elif line := hum_line(trial):
         draft.warn(line)
     return replace(trial, warnings=tuple(draft.warnings))
+
+
+def _with_shown_facts(draft: Draft, trial: Trial, path: Path, shown: Mapping[str, float | None]) -> Trial:
+    """The trial with amplitude and recovery as its lengths show them, where they belie what the file tells."""
+    told = draft.mapping.facts_of(path)
+    for fact in belied(trial):
+        found = shown[fact.name]
+        if told[fact.name] is None and found is not None:
+            draft.warn(f"{fact.what}; {fact.name} is taken as {found:g}")
+            changes: dict[str, Any] = {fact.name: found}
+            trial = replace(trial, facts=replace(trial.facts, **changes))
+    return trial
 
 
 def _check_facts(draft: Draft) -> None:

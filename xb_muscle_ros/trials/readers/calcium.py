@@ -10,15 +10,16 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.activation import Interval, force_drop, stimulated_intervals
+from xb_muscle_ros.trials.checks import CALCIUM_UM
 from xb_muscle_ros.trials.readers.base import Draft, Signal
 from xb_muscle_ros.trials.readers.clock import Clock, times_of
 from xb_muscle_ros.trials.readers.description import Activation
 from xb_muscle_ros.trials.readers.plausibility import warn_of_calcium
 from xb_muscle_ros.trials.trial import Array
 
-# Beyond these it is no free calcium, or its unit is wrong.
-CALCIUM_RANGE_UM = (0.0, 1e5)
-PCA_RANGE = (1.0, 12.0)
+# Beyond these no command takes calcium.
+_CALCIUM_UM = (0.0, CALCIUM_UM)
+PCA_RANGE = (6.0 - math.log10(CALCIUM_UM), 12.0)
 # pCa is noted to a tenth.
 SAME_PCA = 0.05
 PCA_COLUMN = re.compile(r"p[ _-]?ca([^a-z0-9]|$)", re.IGNORECASE)
@@ -68,7 +69,7 @@ def _by_column(draft: Draft, signal: Signal, clock: Clock) -> Calcium:
     if is_pca:
         signal.check(where, signal.values, PCA_RANGE, "pCa {:g}", "is it a concentration?")
     calcium_um = 10.0 ** (6.0 - signal.values) if is_pca else signal.values * column.unit.factor
-    signal.check(where, calcium_um, CALCIUM_RANGE_UM, "{:.6g} µM", "check the column and its unit")
+    signal.check(where, calcium_um, _CALCIUM_UM, "{:.6g} µM", "check the column and its unit")
     changes = np.concatenate(([True], np.diff(calcium_um) != 0.0))
     pca = None
     if np.count_nonzero(changes) == 1 and calcium_um[0] > 0.0:

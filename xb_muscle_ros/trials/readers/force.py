@@ -12,13 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.checks import FORCE_F0
 from xb_muscle_ros.trials.phases import initial_isometric
 from xb_muscle_ros.trials.readers.base import Draft
 from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.trial import Array, Phase
 
-# Beyond these it is no muscle's force, or its unit is wrong.
-FORCE_RANGE_F0 = (-20.0, 20.0)
 # Run-down and changes of preparation stay within these; beyond, the table or the unit is suspect.
 EXPECTED_SCALING = (0.5, 2.0)
 # Force has settled in this part of the slack after a release (from, to; as fractions of it).
@@ -78,8 +77,9 @@ def read_force(
         relative = mapping.force.unit.kind == "relative force"
         force = force * (f0_n if relative else 1.0)
         draft.notes.append(f"{'forces come relative to ' * relative}F0 = {f0_n:.6g} N{mapping.f0_note}")
-    remedy = f"check its unit ({mapping.force.unit_name}) and f0"
-    signal.check(where, force / f0_n, FORCE_RANGE_F0, "{:.6g} F0", remedy)
+    if f0 is not None or mapping.force.unit.kind == "relative force":  # F0 that is sought is not known here
+        remedy = f"check its unit ({mapping.force.unit_name}) and f0, or mend or cut the record"
+        signal.check(where, force / f0_n, FORCE_F0, "{:.6g} F0", remedy)
     if scaling or (scaling is None and mapping.isometric_fractions):
         force = force * _scaling(draft, Force(time_s, force, f0_n), phases, pca)
     return Force(time_s, force, f0_n)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.checks import LENGTH_CHANGE_L0
 from xb_muscle_ros.trials.phases import detect_phases, initial_isometric
 from xb_muscle_ros.trials.readers.base import Draft
 from xb_muscle_ros.trials.readers.description import ImportMapping
@@ -19,8 +20,8 @@ from xb_muscle_ros.trials.readers.plausibility import (
 )
 from xb_muscle_ros.trials.trial import Array, Phase
 
-# Beyond these it is no muscle's length, or its unit is wrong. A whole muscle may go slack, its length near 0.
-LENGTH_RANGE_L0 = (0.1, 3.0)
+# Beyond these no command takes a length.
+_LENGTH_L0 = (1.0 + LENGTH_CHANGE_L0[0], 1.0 + LENGTH_CHANGE_L0[1])
 # From the shortest piece of a fibre to the longest fibres there are (Harris et al. 2005: human sartorius, 0.6 m).
 L0_RANGE_M = (1e-5, 0.7)
 SARCOMERE_RANGE_M = (0.5e-6, 6e-6)
@@ -82,7 +83,7 @@ def _check(draft: Draft, length_m: Array, reference_m: float) -> None:
         hint = (is_fibre and sarcomere_hint(reference_m)) or doubt_of_l0(mapping)
         raise UserError(f"{where}, {signal.name}: L0 is {reference_m:.6g} m; {what} have {low:g} to {high:g} m; {hint}")
     shown = f"{{:.6g}} L0 (L0 = {reference_m:.6g} m)"
-    signal.check(where, length_m / reference_m, LENGTH_RANGE_L0, shown, "check the column and its unit")
+    signal.check(where, length_m / reference_m, _LENGTH_L0, shown, "check the column and its unit")
 
 
 def _note(mapping: ImportMapping, reference: str) -> str:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from xb_muscle_ros.errors import UserError, suggest
-from xb_muscle_ros.trials.readers.assembly import trial_of
+from xb_muscle_ros.trials.readers.assembly import made_of
 from xb_muscle_ros.trials.readers.base import Reader
 from xb_muscle_ros.trials.readers.description import FACTS, ImportMapping, name_of
 from xb_muscle_ros.trials.readers.force import Force, isometric_force
@@ -226,7 +226,7 @@ def _forces(
         own = reader.completed(file, mapping)
         for pending in reader.trials(file, own):
             with contextlib.suppress(UserError):
-                trial = trial_of(pending.read(), own, file, isometric_scaling=False)
+                trial = made_of(pending.read(), own, file, isometric_scaling=False)
                 force = isometric_force(Force(trial.force_time_s, trial.force_n), trial.facts.phases)
                 if force is not None and trial.facts.pca is not None and abs(trial.facts.pca - pca) <= _SAME_PCA:
                     yield force
