@@ -32,7 +32,7 @@ def test_hum_is_found_with_frequency_and_amplitude(hz: float, rate: float) -> No
     assert found[0] == pytest.approx(hz, abs=0.05)
     assert found[1] == pytest.approx(0.01, rel=0.05)
     assert f"hum of {hz:.1f} Hz" in hum_line(trial)
-    assert f"--notch {round(hz, -1):g}" in hum_line(trial)
+    assert f"--notch {hz:g} of import takes it out" in hum_line(trial)
 
 
 @pytest.mark.parametrize(("hz", "amplitude"), [(50.0, 0.0), (35.0, 0.02), (50.0, 5e-4)])
@@ -52,6 +52,27 @@ def test_a_notch_takes_hum_out_and_leaves_the_rest() -> None:
     both = notched(clean, [50.0, 100.0])
     assert np.allclose(both.force_n - 0.5, 8.0 * both.length_change_l0, atol=1e-9)
     assert "notch at 50, 100 Hz" in both.facts.source
+
+
+@pytest.mark.parametrize("hz", [49.3, 49.8, 50.9])
+def test_a_notch_lies_where_hum_has_its_frequency_and_leaves_nothing_at_the_ends(hz: float) -> None:
+    found = notched(recorded(hz, 0.02), [50.0])
+    assert np.max(np.abs(found.force_n - notched(recorded(), [50.0]).force_n)) < 5e-4
+    assert f"notch at 50 Hz, 2 Hz wide, on length and force (laid at {hz:g} Hz)" in found.facts.source
+    assert hum_line(found, [50.0]) == ""
+
+
+def test_hum_beside_a_notch_is_told() -> None:
+    left = hum_line(notched(recorded(60.0, 0.02), [50.0]), [50.0])
+    assert "hum of 60.0 Hz with an amplitude of 2 % F0; --notch 50 60 of import takes it out" in left
+
+
+def test_a_short_record_is_not_offered_what_it_cannot_take() -> None:
+    trial = xb.StretchShortenStretch(0.0383, 0.1, lead_s=0.4, hold_s=0.3).trial("soleus", 6.1, 1000.0)
+    force = 0.5 + 0.02 * np.sin(2.0 * np.pi * 50.0 * trial.time_s)
+    line = hum_line(replace(trial, force_time_s=trial.time_s, force_n=force))
+    assert "hum of 50.0 Hz" in line
+    assert "length lasts 1.05 s, and a notch of 2 Hz needs 1.5 s, so --notch of import cannot take it out" in line
 
 
 def test_a_notch_has_no_phase() -> None:
@@ -83,7 +104,7 @@ def test_what_cannot_be_filtered_is_said(change, said) -> None:
 
 def test_a_short_record_is_refused() -> None:
     trial = xb.StretchShortenStretch(0.0, 0.0).trial("soleus", 6.1)
-    with pytest.raises(UserError, match=r"lasts 0\.284 s; a notch of 2 Hz needs 1\.5 s"):
+    with pytest.raises(UserError, match=r"lasts 0\.284 s, and a notch of 2 Hz needs 1\.5 s"):
         notched(trial, [50.0])
 
 

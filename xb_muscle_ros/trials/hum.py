@@ -64,12 +64,38 @@ def hum(step_s: float, force_f0: Array) -> tuple[tuple[Line, ...], Array]:
     return tuple(lines), rest
 
 
+def line_near(step_s: float, force: Array, frequency_hz: float, within_hz: float) -> float:
+    """The frequency (Hz) of the strongest line around one, finer than the record's resolution; that one if none stands.
+
+    Args:
+        step_s: between samples, s.
+        force: shape (n,).
+        within_hz: how far around it is looked, Hz.
+    """
+    frequencies, power = _spectrum(step_s * np.arange(force.size), force, step_s * force.size)
+    inside = np.flatnonzero(np.abs(frequencies - frequency_hz) <= within_hz)
+    inside = inside[(inside > 0) & (inside < power.size - 1)]
+    if not inside.size:
+        return frequency_hz
+    i = int(inside[np.argmax(power[inside])])
+    below, top, above = np.log(np.maximum(power[i - 1 : i + 2], 1e-300))
+    if not top > max(below, above):  # a slope of what lies beside
+        return frequency_hz
+    return float(frequencies[i] + 0.5 * (below - above) / (below - 2.0 * top + above) * frequencies[1])
+
+
+def _spectrum(time_s: Array, force: Array, span_s: float) -> tuple[Array, Array]:
+    """Frequencies (Hz) and power of a force without its drift, several points for each unit of resolution."""
+    still = force - np.polyval(np.polyfit(time_s, force, 1), time_s)
+    power: Array = np.abs(np.fft.rfft(np.hanning(force.size) * still, _FINE * force.size)) ** 2
+    frequencies: Array = np.arange(power.size, dtype=np.float64) / (_FINE * span_s)
+    return frequencies, power
+
+
 def _most_outstanding(time_s: Array, force: Array, span_s: float) -> float | None:
     """Frequency that stands out from its surroundings most, Hz; None where force has none."""
     n = time_s.size
-    still = force - np.polyval(np.polyfit(time_s, force, 1), time_s)
-    power = np.abs(np.fft.rfft(np.hanning(n) * still, _FINE * n)) ** 2
-    frequencies = np.arange(power.size) / (_FINE * span_s)
+    frequencies, power = _spectrum(time_s, force, span_s)
     level = median_filter(power, _FINE * _AROUND + 1, mode="nearest")
     counted = (frequencies * span_s >= _PERIODS) & (level > 0.0)
     if not np.any(counted):

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import iirnotch, sosfiltfilt, tf2sos
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.hum import hum, sine_in
+from xb_muscle_ros.trials.hum import hum, line_near, sine_in
 from xb_muscle_ros.trials.phases import initial_isometric
 from xb_muscle_ros.trials.trial import Array, Trial
 
@@ -27,13 +27,16 @@ _EVEN = 0.02
 # A record is at least so many times as long as the filter remembers.
 _LONG = 3.0
 _HIGHEST_HZ = 1000.0
+# The frequency of hum is sought in so many samples in the middle of a record at most.
+_MOST_SOUGHT = 1 << 18
 
 
-def hum_of_mains(time_s: Array, force_f0: Array) -> tuple[float, float] | None:
+def hum_of_mains(time_s: Array, force_f0: Array, without_hz: Sequence[float] = ()) -> tuple[float, float] | None:
     """Frequency (Hz) and amplitude (F0) of hum of 50 or 60 Hz in a force that holds still; None where there is none.
 
     Args:
         time_s, force_f0: shape (n,), evenly sampled, s and F0.
+        without_hz: notches that were made; what rings within them is no hum.
     """
     t, force = time_s[-_MOST:], force_f0[-_MOST:]
     if t.size < _LEAST:
@@ -42,6 +45,8 @@ def hum_of_mains(time_s: Array, force_f0: Array) -> tuple[float, float] | None:
     near = max(_NEAR_HZ, 0.5 / float(t[-1] - t[0]))
     lines, _ = hum(step_s, force)
     for line in lines:
+        if any(abs(hz - line.frequency_hz) <= 0.5 * WIDTH_HZ for hz in without_hz):
+            continue
         mains = min(MAINS_HZ, key=lambda hz: abs(hz - line.frequency_hz))
         amplitude = float(np.sqrt(2.0 * line.power_f0))
         if abs(mains - line.frequency_hz) <= near and amplitude >= LEAST_F0:
@@ -49,29 +54,35 @@ def hum_of_mains(time_s: Array, force_f0: Array) -> tuple[float, float] | None:
     return None
 
 
-def hum_line(trial: Trial) -> str:
-    """One line on the hum in a trial's force before its first change of length; empty where there is none."""
+def hum_line(trial: Trial, without_hz: Sequence[float] = ()) -> str:
+    """One line on the hum in a trial's force before its first change of length; empty where there is none.
+
+    Args:
+        without_hz: notches that were made already.
+    """
     isometric = initial_isometric(trial.force_time_s, trial.facts.phases)
     inside = slice(max(isometric.stop - _MOST, 0), isometric.stop)
     time_s = trial.force_time_s[inside]
     if time_s.size < _LEAST or not _even(time_s):
         return ""
-    found = hum_of_mains(time_s, trial.force_n[inside] / trial.facts.f0_n)
+    found = hum_of_mains(time_s, trial.force_n[inside] / trial.facts.f0_n, without_hz)
     # A notch needs even samples everywhere.
     if found is None or not _even(trial.force_time_s):
         return ""
-    mains = min(MAINS_HZ, key=lambda hz: abs(hz - found[0]))
-    return (
-        f"force has hum of {found[0]:.1f} Hz with an amplitude of {100.0 * found[1]:.2g} % F0; --notch {mains:g} of "
-        "import takes it out of length and force"
-    )
+    line = f"force has hum of {found[0]:.1f} Hz with an amplitude of {100.0 * found[1]:.2g} % F0"
+    times = (("length", trial.time_s), ("force", trial.force_time_s))
+    fault = next((fault for what, t in times if (fault := _fault(what, t, found[0]))), "")
+    if fault:
+        return f"{line}; {fault}, so --notch of import cannot take it out"
+    notches = " ".join(f"{round(hz, 1):g}" for hz in (*without_hz, found[0]))
+    return f"{line}; --notch {notches} of import takes it out of length and force"
 
 
 def notched(trial: Trial, frequencies_hz: Sequence[float]) -> Trial:
     """A trial without some frequencies: length and force go through the same filter, forwards and backwards.
 
-    Each notch is 2 Hz wide (half power) and shifts nothing in time; a corner of length rings at its frequency, in force
-    as in length.
+    Each notch is 2 Hz wide (half power), lies where force has most within that width, and shifts nothing in time; a
+    corner of length rings at its frequency, in force as in length.
 
     Args:
         frequencies_hz: of the notches, each below half the sampling rate.
@@ -79,11 +90,13 @@ def notched(trial: Trial, frequencies_hz: Sequence[float]) -> Trial:
     Raises:
         UserError: samples are not even or too few, or a frequency is none that they show.
     """
-    length = _filtered("length", trial.time_s, trial.length_m, frequencies_hz)
+    found_hz = [_found(trial, hz) for hz in frequencies_hz]
+    length = _filtered("length", trial.time_s, trial.length_m, found_hz)
     force = trial.force_n
     if trial.force_time_s.size:
-        force = _filtered("force", trial.force_time_s, trial.force_n, frequencies_hz)
-    told = f"notch at {', '.join(f'{hz:g}' for hz in frequencies_hz)} Hz, {WIDTH_HZ:g} Hz wide, on length and force"
+        force = _filtered("force", trial.force_time_s, trial.force_n, found_hz)
+    asked, laid = (", ".join(f"{hz:.4g}" for hz in each) for each in (frequencies_hz, found_hz))
+    told = f"notch at {asked} Hz, {WIDTH_HZ:g} Hz wide, on length and force" + f" (laid at {laid} Hz)" * (laid != asked)
     source = "; ".join(filter(None, [trial.facts.source, told]))
     return replace(trial, length_m=length, force_n=force, facts=replace(trial.facts, source=source))
 
@@ -99,22 +112,37 @@ def check_frequencies(frequencies_hz: Sequence[float], what: str) -> None:
             raise UserError(f"{what} is {hz:g} Hz; allowed is 1 to {_HIGHEST_HZ:g}, for example 50")
 
 
-def _filtered(what: str, time_s: Array, values: Array, frequencies_hz: Sequence[float]) -> Array:
+def _found(trial: Trial, hz: float) -> float:
+    """Where hum lies within a notch: mains of 50 Hz may have 49.8."""
+    middle = slice(max((trial.force_n.size - _MOST_SOUGHT) // 2, 0), (trial.force_n.size + _MOST_SOUGHT) // 2)
+    time_s = trial.force_time_s[middle]
+    if time_s.size < _LEAST or not _even(time_s):
+        return hz
+    return line_near(float(time_s[-1] - time_s[0]) / (time_s.size - 1), trial.force_n[middle], hz, 0.5 * WIDTH_HZ)
+
+
+def _fault(what: str, time_s: Array, hz: float) -> str:
+    """Why samples at these times take no notch; empty where they do."""
     if time_s.size < 2 or not _even(time_s):
-        raise UserError(f"{what} is not sampled evenly, which a notch needs; leave --notch out")
+        return f"{what} is not sampled evenly, which a notch needs"
+    span_s = float(time_s[-1] - time_s[0])
+    if span_s < _LONG / WIDTH_HZ:
+        return f"{what} lasts {span_s:.3g} s, and a notch of {WIDTH_HZ:g} Hz needs {_LONG / WIDTH_HZ:g} s"
+    rate_hz = (time_s.size - 1) / span_s
+    if hz >= 0.5 * rate_hz:
+        needed = f"more than {2.0 * hz:.4g} samples per second"
+        return f"a notch at {hz:.4g} Hz needs {needed}; {what} has {rate_hz:.4g}"
+    return ""
+
+
+def _filtered(what: str, time_s: Array, values: Array, frequencies_hz: Sequence[float]) -> Array:
+    fault = next((fault for hz in frequencies_hz if (fault := _fault(what, time_s, hz))), "")
+    if fault:
+        raise UserError(f"{fault}; leave --notch out")
     rate_hz = (time_s.size - 1) / float(time_s[-1] - time_s[0])
-    if time_s[-1] - time_s[0] < _LONG / WIDTH_HZ:
-        raise UserError(
-            f"{what} lasts {time_s[-1] - time_s[0]:.3g} s; a notch of {WIDTH_HZ:g} Hz needs "
-            f"{_LONG / WIDTH_HZ:g} s; leave --notch out"
-        )
     level = float(np.mean(values))
     out = values - level
     for hz in frequencies_hz:
-        if hz >= 0.5 * rate_hz:
-            raise UserError(
-                f"a notch at {hz:g} Hz needs more than {2.0 * hz:g} samples per second; {what} has {rate_hz:.4g}"
-            )
         sections = tf2sos(*iirnotch(hz, hz / WIDTH_HZ, rate_hz))
         # What is the same all the time goes first: at the ends, where the filter begins, it would stay.
         out = out - sine_in(time_s, out, hz)

@@ -106,7 +106,7 @@ def made_of(recording: Recording, mapping: ImportMapping, path: Path, isometric_
     if mapping.notch_hz:
         with naming(draft.where):
             trial = notched(trial, mapping.notch_hz)
-    elif line := hum_line(trial):
+    if line := hum_line(trial, mapping.notch_hz):
         draft.warn(line)
     return replace(trial, warnings=tuple(draft.warnings))
 
