@@ -87,8 +87,8 @@ def line_near(step_s: float, force: Array, frequency_hz: float, within_hz: float
 def _spectrum(time_s: Array, force: Array, span_s: float) -> tuple[Array, Array]:
     """Frequencies (Hz) and power of a force without its drift, several points for each unit of resolution."""
     still = force - np.polyval(np.polyfit(time_s, force, 1), time_s)
-    power: Array = np.abs(np.fft.rfft(np.hanning(force.size) * still, _FINE * force.size)) ** 2
-    frequencies: Array = np.arange(power.size, dtype=np.float64) / (_FINE * span_s)
+    power: Array = np.square(np.abs(np.fft.rfft(np.hanning(force.size) * still, _FINE * force.size)))
+    frequencies: Array = np.arange(float(power.size)) / (_FINE * span_s)
     return frequencies, power
 
 
