@@ -11,10 +11,9 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.models.fibre_making import KnownOfFibre, known_like, make_fibre
 from xb_muscle_ros.trials.readers.length import L0_RANGE_M
 from xb_muscle_ros.trials.readers.mapping import F0_RANGES
-from xb_muscle_ros.trials.readers.units import quantity
+from xb_muscle_ros.trials.readers.units import number_and_unit, quantity
 
 _AREAS_M2 = {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6, "um2": 1e-12}
-_NUMBER_AND_UNIT = re.compile(r"\s*([0-9.eE+-]+?)\s*([A-Za-zµμ%][\w/²^]*)\s*")
 
 
 def new_fibre(
@@ -88,8 +87,7 @@ def _amount(
     if given is None:
         return None
     if isinstance(given, str):
-        match = _NUMBER_AND_UNIT.fullmatch(given)
-        found = quantity(f"{match.group(1)} {match.group(2)}" if match else given, kind, "value", option, example)
+        found = quantity(given, kind, "value", option, example)
         if found.kind != kind:
             raise UserError(f"{option} is '{given}'; needed is a {kind}, for example '{example}'")
         # 1.05 mm is 0.00105 m, and not the next number.
@@ -107,12 +105,9 @@ def _area(given: str | float | None) -> float | None:
     if given is None:
         return None
     if isinstance(given, str):
-        match = _NUMBER_AND_UNIT.fullmatch(given)
-        unit = "" if match is None else re.sub("[µμ]", "u", match.group(2)).replace("²", "2").replace("^", "")
-        try:
-            value = float(f"{float(match.group(1)) * _AREAS_M2[unit]:.15g}") if match else math.nan
-        except (KeyError, ValueError):
-            value = math.nan
+        number, name = number_and_unit(given)
+        unit = re.sub("[µμ]", "u", name).replace("²", "2").replace("^", "")
+        value = float(f"{number * _AREAS_M2.get(unit, math.nan):.15g}")
     else:
         value = float(given)
     if not 0.0 < value < 1.0:

@@ -9,6 +9,7 @@ import lab_tables as lab
 import pytest
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.inspecting.inspection import inspect_file
 
 TITLES = ["Experiment 12", "Date,2018-12-17", "Rate,1000", "Temperature,15,degC", ""]
 BY_NUMBER = {
@@ -325,6 +326,19 @@ def test_labview_without_times_and_with_decimal_commas(tmp_path: Path) -> None:
     lines[18] = "Delta_X\t0,001\t0,002\t"
     path = lab.write(tmp_path / "other", lines, "two.lvm")
     assert "Delta_X of the channels differs (0.001, 0.002 s)" in lab.refusal(path, columns)
+
+
+def test_an_empty_column_of_time_beside_a_rate_is_not_proposed(tmp_path: Path) -> None:
+    rows = ["\t" + line for line in lab.rows(lab.LENGTH_MM, lab.FORCE_MN, delimiter="\t")]
+    path = lab.write(tmp_path, labview(rows, x_columns="No"), "rig.lvm")
+    found = inspect_file(path)
+    assert found.proposal.tree["columns"]["time"] == {"rate": "1000 Hz"}
+    assert [line.partition(":")[0] for line in found.proposal.missing] == ["f0", "pca"]
+    columns = {**unitless("X_Value", "Length", "Force"), "time": {"column": "X_Value", "unit": "s"}}
+    why = lab.refusal(path, columns)
+    assert "name another column, or none for the time: there are 1000 samples in a second by 'the head of" in why
+    (trial,) = lab.trials(path, found.proposal.tree["columns"])
+    lab.same(trial)
 
 
 def test_a_header_that_comes_again_begins_another_trial(tmp_path: Path) -> None:

@@ -73,10 +73,13 @@ def test_a_unit_of_something_else_is_refused() -> None:
 
 def test_quantities_come_in_base_units() -> None:
     assert quantity("42.8 mm", "length", "reference_length", "here") == Quantity(pytest.approx(0.0428), "length")
+    assert quantity("42.8mm", "length", "reference_length", "here") == Quantity(pytest.approx(0.0428), "length")
+    assert quantity("1e-3N", "force", "f0", "here") == Quantity(1e-3, "force")
+    assert quantity("100%L0", "length", "reference_length", "here") == Quantity(pytest.approx(1.0), "relative length")
     assert quantity(" 97 kPa", "force", "f0", "here") == Quantity(97e3, "stress")
 
 
-@pytest.mark.parametrize("text", ["42.8", "mm", "42.8mm", "-1 mm", "0 mm", "nan mm", "inf mm", "long mm", ""])
+@pytest.mark.parametrize("text", ["42.8", "mm", "4 2.8 mm", "-1 mm", "0 mm", "nan mm", "inf mm", "long mm", ""])
 def test_what_is_no_quantity_is_refused(text: str) -> None:
     with pytest.raises(UserError, match=r"reference_length is '.*'; needed is a number above 0 and its unit"):
         quantity(text, "length", "reference_length", "here")

@@ -12,6 +12,8 @@ import lab_tables as lab
 import numpy as np
 import pytest
 
+from xb_muscle_ros.trials.readers.registry import READERS
+
 openpyxl = pytest.importorskip("openpyxl", reason="needs openpyxl")
 xlwt = pytest.importorskip("xlwt", reason="needs xlwt")
 pytest.importorskip("python_calamine", reason="needs the extra files")
@@ -213,3 +215,17 @@ def test_what_is_called_a_workbook_and_is_none(suffix: str, tmp_path: Path) -> N
     why = lab.refusal(path)
     assert str(path) in why
     assert "\n" not in why
+
+
+def test_formulas_that_nothing_has_worked_out_are_told_with_the_remedy(tmp_path: Path) -> None:
+    formulas = [[t, length, 2 * f, f"=C{i}/2"] for i, (t, length, f) in enumerate(ROWS, 2)]
+    path = book(tmp_path, first=[["notes"]], run_1=[[*lab.NAMES[:2], "twice", lab.NAMES[2]], *formulas])
+    why = lab.refusal(path, sheet="run 1")
+    assert f"row 2, column '{lab.NAMES[2]}' holds a formula without its value (a run of {len(ROWS)} rows)" in why
+    assert "open the workbook in Excel or LibreOffice, which works formulas out, and save it there" in why
+    others = READERS["xlsx"].contents(path).others
+    assert any(
+        f"column '{lab.NAMES[2]}' holds formulas without their values; open the workbook" in line for line in others
+    )
+    everything = book(tmp_path, name="u.xlsx", run=[lab.NAMES, *([f"={i}/1000", "=1.2", "=0.3"] for i in range(50))])
+    assert f"row 2, column '{lab.NAMES[0]}' holds a formula without its value" in lab.refusal(everything)

@@ -148,6 +148,8 @@ def _time(made: Proposal, reader: Reader, contents: Contents, found: Recognition
         made.add(1, f"time: {{stamp: {clock}}}")
     elif "time" in found.roles:
         _signal(made, reader, found.roles["time"])
+    elif contents.rate is not None and "time" not in found.unclear:
+        made.add(1, f"time: {{rate: {contents.rate[0]:.9g} Hz}}", f"as '{contents.rate[1]}' tells")
     else:
         even = [one.label for one in unrecognised(found, contents) if _is_even(one)]
         hint = f" ({', '.join(even)} increases evenly)" if even else ""

@@ -72,7 +72,9 @@ def recognise(contents: Contents) -> Recognition:
         found.taken_for[content.label] = why_not
         told = content.unit or _named(content).unit
         found.units[content.label] = told if one is None else one.unit or volts_of(told, one.role)
-        if one is not None:
+        if one is not None and one.role == "time" and contents.rate is not None and not content.finite.size:
+            found.taken_for[content.label] = f"holds no time; '{contents.rate[1]}' tells the rate"
+        elif one is not None:
             candidates[one.role].append(one)
     for role, each in candidates.items():
         if role == "time" and any(content.times_s is not None for content in contents.signals):

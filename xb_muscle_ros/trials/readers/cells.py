@@ -15,6 +15,10 @@ from xb_muscle_ros.trials.trial import Array
 # Text, or a number that a workbook holds as such.
 Cell = str | float
 
+# In place of what a formula of a workbook gives, where nothing has worked it out.
+FORMULA = "a formula without its value"
+WORKED_OUT = "open the workbook in Excel or LibreOffice, which works formulas out, and save it there"
+
 POINT, COMMA = "point", "comma"
 DECIMALS = (POINT, COMMA)
 _WITH_COMMA = re.compile(r"[+-]?(\d*,\d+|\d+,)([eE][+-]?\d+)?")
@@ -77,10 +81,12 @@ def is_blank(cell: Cell) -> bool:
 
 
 def like_number(cell: Cell) -> bool:
-    """Whether a cell holds a number, with whatever marks, or the time of a clock."""
+    """Whether a cell holds a number, with whatever marks, or the time of a clock, or would with its formula's value."""
     if not isinstance(cell, str):
         return True
     text = cell.strip()
+    if text == FORMULA:
+        return True
     if math.isnan(number(text)) and math.isnan(number(text, COMMA)):
         return is_grouped(text) or is_clock(text)
     return True

@@ -9,7 +9,7 @@ from xb_muscle_ros.trials.activation import CalciumTransient
 from xb_muscle_ros.trials.readers.description import FACTS, Activation, Column, Stimulation
 from xb_muscle_ros.trials.readers.side_by_side import TRIAL
 from xb_muscle_ros.trials.readers.tree import Keys, check_keys
-from xb_muscle_ros.trials.readers.units import Unit, quantity, unit_of
+from xb_muscle_ros.trials.readers.units import Unit, number_and_unit, quantity, unit_of
 
 FILE = "file"
 BAG = "bag"
@@ -131,7 +131,7 @@ def _constant(keys: Keys, name: str, example: str) -> float:
     text = keys.text(name, f"give a value with its unit, for example '{example}'")
     found = quantity(text, "time" if example.endswith("ms") else "calcium", keys.name(name), keys.where, example)
     # pCa is a logarithm: quantity leaves it alone.
-    return 10.0 ** (6.0 - float(text.split()[0])) if found.kind == "pCa" else found.value
+    return 10.0 ** (6.0 - number_and_unit(text)[0]) if found.kind == "pCa" else found.value
 
 
 def _times(keys: Keys) -> tuple[float | None, float | None]:

@@ -67,6 +67,7 @@ class Contents:
         facts: what the file tells beside its signals, by name, as text.
         others: what is there and is no signal, one line each.
         notes: what was wrong or found out, one line each.
+        rate: samples in a second and where that is told, where no signal has to tell the times.
         in_header: of ``f0`` and ``reference_length``, what an import takes from the file itself.
     """
 
@@ -77,3 +78,4 @@ class Contents:
     others: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     in_header: tuple[str, ...] = ()
+    rate: tuple[float, str] | None = None

@@ -14,7 +14,9 @@ import numpy.typing as npt
 from xb_muscle_ros.errors import UserError, suggest
 from xb_muscle_ros.trials.readers.cells import (
     COMMA,
+    FORMULA,
     POINT,
+    WORKED_OUT,
     Cell,
     clock_seconds,
     is_blank,
@@ -175,8 +177,16 @@ class Table:
         if int(bad.sum()) > run:
             more += f"; so do {int(bad.sum()) - run} further {self.rows.word}s"
         remedy = f"needed is a finite number; mend or remove the {self.rows.word}"
-        if allowed:
+        if text == FORMULA:
+            remedy = WORKED_OUT
+        elif allowed:
             remedy = f"needed is a finite number; {allowed}"
+        elif bool(bad.all()) and not text:
+            remedy = "name another column"
+            if self.rate is not None:
+                remedy += (
+                    f", or none for the time: there are {self.rate[0]:.6g} samples in a second by '{self.rate[1]}'"
+                )
         elif run > 1 and not text:
             remedy = f"needed is a finite number; remove these {self.rows.word}s, or fill them in where the signal is "
             remedy += "known"
@@ -184,7 +194,7 @@ class Table:
             remedy = "thousands separators are not read; export the numbers without them"
         elif "," in text and self.decimal == POINT:
             remedy = "if that is a decimal comma, give --decimal comma; else mend or remove the line"
-        found = f"'{text}'" if text else "nothing"
+        found = text if text == FORMULA else f"'{text}'" if text else "nothing"
         raise UserError(f"{self.where}, {self.place(first)}, column '{column}' holds {found}{more}; {remedy}")
 
     def _clock(self, column: str, rows: Indices) -> Array:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from xb_muscle_ros.trials.inspecting.words import read_name
-from xb_muscle_ros.trials.readers.cells import COMMA, is_grouped
+from xb_muscle_ros.trials.readers.cells import COMMA, FORMULA, WORKED_OUT, is_grouped
 from xb_muscle_ros.trials.readers.contents import Content, Contents
 from xb_muscle_ros.trials.readers.encoding import read_text
 from xb_muscle_ros.trials.readers.table import Table
@@ -43,11 +43,13 @@ def table_contents(path: Path, tables: Iterator[Table]) -> Contents:
     sheet = f"sheet '{table.sheet}', " if table.sheet else ""
     form = f"{sheet}decimal {mark}, {len(rows)} rows"
     facts = {} if table.sheet else dict(_facts(path))
-    return Contents(form, tuple(columns), facts=facts, others=tuple(others), notes=table.notices)
+    return Contents(form, tuple(columns), facts=facts, others=tuple(others), notes=table.notices, rate=table.rate)
 
 
 def _text_column(name: str, different: list[str]) -> str:
     """A column of words."""
+    if different == [FORMULA]:
+        return f"column '{name}' holds formulas without their values; {WORKED_OUT}"
     shown = ", ".join(f"'{text}'" for text in different[:_MOST_TEXTS])
     more = ", ..." if len(different) > _MOST_TEXTS else ""
     return f"column '{name}' holds no numbers but {len(different)} texts: {shown}{more}"

@@ -75,6 +75,11 @@ _CALIBRATED = ("length", "force")
 _PER_VOLT = re.compile(
     r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>\S+?)\s*/\s*(?P<per>m?V)\s*"
 )
+# A number and its unit, with a blank between them or without.
+_NUMBER_AND_UNIT = re.compile(
+    r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
+    r"(?:\s+(?P<apart>\S+)|(?![eE][+-]?\d)(?P<joined>[^\W\d_]\S*|%\S*))\s*"
+)
 VOLTS = ("V", "mV")
 # A stress by its area: ``mN/mm^2``, ``N cm-2``, ``kN.m^-2``.
 _PER_AREA = re.compile(r"(?P<unit>[A-Za-z]+)(?:\s*/\s*(?P<area>mm|cm|m)\^?2|[ .*·⋅](?P<area_below>mm|cm|m)\^?-2)")
@@ -159,7 +164,7 @@ def reading(text: str, column: str, unit: Unit, what: str, where: str, example: 
     Raises:
         UserError: no number with a unit that fits.
     """
-    value, name = _number_and_unit(text)
+    value, name = number_and_unit(text)
     if not math.isfinite(value):
         raise UserError(f"{where}: {what} is '{text}'; needed is a number and its unit, for example '{example}'")
     if unit.per and name in VOLTS:
@@ -168,15 +173,10 @@ def reading(text: str, column: str, unit: Unit, what: str, where: str, example: 
     return Quantity(value * own.factor, own.kind)
 
 
-def _number_and_unit(text: str) -> tuple[float, str]:
-    """The two parts of a reading such as ``42.5 mm``; the number is NaN where it is none."""
-    parts = text.split()
-    if len(parts) != 2:
-        return math.nan, ""
-    try:
-        return float(parts[0]), parts[1]
-    except ValueError:
-        return math.nan, parts[1]
+def number_and_unit(text: str) -> tuple[float, str]:
+    """The two parts of a reading such as ``42.5 mm`` or ``42.5mm``; the number is NaN where it is none."""
+    match = _NUMBER_AND_UNIT.fullmatch(text)
+    return (math.nan, "") if match is None else (float(match["number"]), match["apart"] or match["joined"])
 
 
 def _plain_unit(text: str, column: str, what: str, where: str) -> Unit:
@@ -202,7 +202,7 @@ def quantity(text: str, column: str, what: str, where: str, example: str = "42.8
     Raises:
         UserError: no such number with a fitting unit; the message shows the example.
     """
-    value, name = _number_and_unit(text)
+    value, name = number_and_unit(text)
     if not (math.isfinite(value) and (value > 0.0 or (zero and value == 0.0))):
         least = "from" if zero else "above"
         raise UserError(

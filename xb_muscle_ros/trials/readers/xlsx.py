@@ -18,6 +18,7 @@ from xb_muscle_ros.trials.readers.options import ANY_TABLE, Sheets, TableOptions
 from xb_muscle_ros.trials.readers.rows import CellRows
 from xb_muscle_ros.trials.readers.table import Table
 from xb_muscle_ros.trials.readers.tabular import TableReader
+from xb_muscle_ros.trials.readers.xlsx_formulas import with_formulas
 
 
 class XlsxReader(TableReader):
@@ -94,7 +95,7 @@ def _chosen(path: Path, names: Sequence[str], sheets: Sheets | None) -> list[str
 
 def _table(path: Path, name: str, workbook: Any, options: TableOptions) -> Table:
     sheet = workbook.get_sheet_by_name(name)
-    everything = sheet.to_python(skip_empty_area=False)
+    everything = with_formulas(path, name, sheet.to_python(skip_empty_area=False))
     numbers = [i for i, row in enumerate(everything, 1) if any(cell != "" for cell in row)]
     moments = {j for row in everything for j, cell in enumerate(row) if isinstance(cell, datetime.datetime)}
     rows = [_ended([_cell(cell, j in moments) for j, cell in enumerate(everything[i - 1])]) for i in numbers]
