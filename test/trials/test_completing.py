@@ -257,7 +257,7 @@ def test_samples_that_nothing_can_be_compared_by_are_refused(
         force_n=made.force_n[:forces],
     )
     bag = foreign.write_folder(tmp_path / "bag", [foreign.messages(few)], foreign.facts_of(few, ("phases",)))
-    with pytest.raises(UserError, match=f"there are {words}.*; needed are 3; leave the bag out"):
+    with pytest.raises(UserError, match=f"there are {words}.*; needed are 3; leave it out"):
         foreign.study(bag)
 
 

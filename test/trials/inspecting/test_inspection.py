@@ -114,6 +114,31 @@ def test_an_unknown_unit_of_a_named_signal_is_left_to_be_filled_in(tmp_path: Pat
     assert not found.imports
 
 
+@pytest.mark.parametrize("name", ["pCa {} (mN)", "Force pCa {} (mN)", "F_pCa{} [mN]"])
+def test_a_column_for_each_pca_is_a_trial_each(tmp_path: Path, name: str) -> None:
+    forces = {name.format(6.1): 0.5 * FORCE_MN, name.format(4.5): FORCE_MN}
+    file = table(tmp_path / "a.csv", {"time_s": TIME_S, "length_mm": LENGTH_MM, **forces}, comments="# F0 = 0.5 mN\n")
+    found = inspect_file(file)
+    assert found.imports
+    assert {found.recognition.taken_for[each] for each in forces} == {"force of a trial, whose pCa its name tells"}
+    assert any("each of a trial" in line for line in found.proposal.guesses)
+    events = imports([file], found.proposal.text, tmp_path / "out")
+    assert [event.trial.facts.pca for event in events] == [6.1, 4.5]
+    assert events[0].trial.force_n == pytest.approx(0.5e-3 * FORCE_MN, rel=1e-6)
+
+
+def test_columns_of_pca_in_other_units_are_left_open(tmp_path: Path) -> None:
+    forces = {"Force pCa 6.1 (mN)": FORCE_MN, "Force pCa 4.5 (uN)": FORCE_MN}
+    found = inspect_file(table(tmp_path / "a.csv", {"time_s": TIME_S, "length_mm": LENGTH_MM, **forces}))
+    assert set(found.recognition.unclear) == {"force"}
+
+
+def test_a_column_that_holds_the_pca_it_is_called_by_is_calcium(tmp_path: Path) -> None:
+    columns = {"time_s": TIME_S, "length_mm": LENGTH_MM, "force_mN": FORCE_MN, "pCa 6.1": np.full(400, 6.1)}
+    found = inspect_file(table(tmp_path / "a.csv", columns))
+    assert found.recognition.roles["calcium"].content.name == "pCa 6.1"
+
+
 def test_grams_are_the_weight_of_a_mass(tmp_path: Path) -> None:
     file = table(tmp_path / "a_pCa45.csv", {"time_s": TIME_S, "length_mm": LENGTH_MM, "force (g)": FORCE_MN})
     found = inspect_file(file)

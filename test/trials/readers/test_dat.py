@@ -139,7 +139,7 @@ def test_units_of_the_file_count(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("unit", "factor"), [("g", 9.80665e-3), ("mg", 9.80665e-6), ("grams", 9.80665e-3)])
 def test_grams_are_the_weight_of_a_mass(tmp_path: Path, unit: str, factor: float) -> None:
-    trial = read(dat(tmp_path / "a.dat", names=NAMES.replace("Fin (mN)", f"Fin ({unit})")))
+    trial = read(dat(tmp_path / "a.dat", names=NAMES.replace("Fin (mN)", f"Fin ({unit})")), f0="400 g")
     assert trial.force_n == pytest.approx(factor * FORCE_MN, rel=1e-5)
 
 

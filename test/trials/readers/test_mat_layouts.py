@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -316,6 +317,67 @@ def test_contents_are_vectors_columns_and_what_is_no_signal(tmp_path: Path, save
     assert (signals["trials.force"].unit, signals["trials.force"].values[0]) == ("mN", 5.0)
     assert found.trials == ("1", "2")
     assert {"trials.name: text 'a'", "n: 7"} <= set(found.others)
+
+
+@pytest.mark.parametrize(
+    ("content", "names", "others"),
+    [
+        ({"force": [FORCE, 2 * FORCE], "pCa": [[4.5], [6.1]]}, ("force(:,trial)", "pCa(trial)"), ()),
+        ({"force": [FORCE, 2 * FORCE], "pCa": [[4.5]]}, ("force(:,trial)", "pCa"), ()),
+        ({"Data": [FORCE, 2 * FORCE], "n": [[4.5], [6.1]]}, ("Data(:,1)", "Data(:,2)", "n"), ()),
+        ({"force": [FORCE, 2 * FORCE], "n": [[4.5]]}, ("force(:,trial)",), ("n: 4.5",)),
+    ],
+)
+def test_trials_in_matrices_and_their_pca(
+    tmp_path: Path, save: Save, content: dict[str, Any], names: tuple[str, ...], others: tuple[str, ...]
+) -> None:
+    arrays = {name: np.array(rows).T if len(rows[0]) > 1 else np.array(rows) for name, rows in content.items()}
+    found = reader_for(path := save(tmp_path / "f.mat", {"time": TIME, **arrays})).contents(path)
+    assert ({each.name for each in found.signals}, found.others) == ({"time", *names}, others)
+    turned = {name: values.T for name, values in arrays.items() if name == "force"}
+    found = reader_for(path := save(tmp_path / "g.mat", {"time": TIME, **arrays, **turned})).contents(path)
+    assert [each.name for each in found.signals if each.name.startswith("force")] == ["force(trial,:)"] * len(turned)
+
+
+def test_a_matrix_whose_first_column_is_time_is_no_trials(tmp_path: Path, save: Save) -> None:
+    path = save(tmp_path / "f.mat", {"force": np.column_stack([TIME, LENGTH, FORCE])})
+    assert [each.name for each in reader_for(path).contents(path).signals] == [f"force(:,{i})" for i in (1, 2, 3)]
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ({"pCa": np.array([[4.5], [6.1]])}, "trial f_2: pCa(trial) holds 6.1, but pCa is given as 4.5"),
+        ({"pCa": np.array([[6.1]])}, "trial f_1: pCa holds 6.1, but pCa is given as 4.5"),
+        ({"pca": np.full((COUNT, 1), 6.1)}, "trial f_1: pca holds 6.1, but pCa is given as 4.5"),
+        ({"pCa": np.array([[4.5], [4.51]])}, ""),
+        ({"pCa": np.array([[4.5], [6.1], [7.0]]), "pCaX": np.array([[6.1]])}, ""),
+        ({"pCa": np.array([[100.0]])}, ""),
+        ({"other": {"pCa": np.array([[6.1]])}}, ""),
+    ],
+)
+def test_a_variable_that_tells_another_pca_is_refused(
+    tmp_path: Path, save: Save, content: dict[str, Any], told: str
+) -> None:
+    path = save(
+        tmp_path / "f.mat", {"time": TIME, "length": LENGTH, "force": np.array([FORCE, 2 * FORCE]).T, **content}
+    )
+    keys = columns(force="force(:,trial)")
+    if told:
+        with pytest.raises(UserError, match=re.escape(told) + ".*--calcium-column"):
+            read(path, columns=keys)
+    else:
+        assert [trial.facts.pca for trial in read(path, columns=keys).values()] == [4.5, 4.5]
+
+
+def test_a_field_that_tells_another_pca_is_refused(tmp_path: Path, save: Save) -> None:
+    fields = {"time": TIME, "length": LENGTH, "force": FORCE}
+    path = save(tmp_path / "f.mat", {"trials": structs(*({**fields, "pCa": np.array([pca])} for pca in (4.5, 6.1)))})
+    keys = columns(**{name: f"trials.{name}" for name in fields})
+    with pytest.raises(UserError, match=r"trial f_2: trials\.pCa holds 6\.1, .* --calcium-column 'trials\.pCa'"):
+        read(path, columns=keys)
+    trials = read(path, pca=None, columns={**keys, "calcium": {"column": "trials.pCa", "unit": "pCa"}})
+    assert [trial.facts.pca for trial in trials.values()] == [4.5, 6.1]
 
 
 @pytest.mark.parametrize("writer", [save7, save73])

@@ -12,6 +12,7 @@ import lab_tables as lab
 import numpy as np
 import pytest
 
+from xb_muscle_ros.trials.inspecting.inspection import inspect_file
 from xb_muscle_ros.trials.readers.registry import READERS
 
 openpyxl = pytest.importorskip("openpyxl", reason="needs openpyxl")
@@ -67,6 +68,24 @@ def test_a_sheet_by_name_and_by_pattern_with_facts(tmp_path: Path) -> None:
     assert "has no sheet 'pCa6.2'; its sheets: pCa4.5, pCa6.1, notes; did you mean 'pCa6.1'" in lab.refusal(
         book(tmp_path / "c", **sheets), sheet="pCa6.2"
     )
+
+
+def test_sheets_that_are_called_by_their_pca_are_proposed(tmp_path: Path) -> None:
+    cover = [["Experiment", "soleus"], ["Force", "mN"]]
+    sheets = {"notes": cover, "pCa_4.5": [lab.NAMES, *ROWS], "pCa_6.1": [lab.NAMES, *DOUBLE]}
+    found = inspect_file(book(tmp_path, **sheets))
+    assert found.proposal.tree["sheet"]["pattern"].startswith(".*[pP]")
+    assert not any(line.startswith("pca") for line in found.proposal.missing)
+    assert found.contents.sheets == ("pCa 4.5", "pCa 6.1")
+
+
+def test_a_sheet_that_is_called_by_another_pca_is_told(tmp_path: Path) -> None:
+    path = book(tmp_path, **{"pCa_4.5": [lab.NAMES, *ROWS], "pCa_6.1": [lab.NAMES, *DOUBLE]})
+    one, two = lab.trials(path, pca=4.5)
+    assert "tells pCa" not in lab.told(one)
+    assert "the name of the trial, 't_pCa 6.1', tells pCa 6.1, it has 4.5; check both" in lab.told(two)
+    (alone,) = lab.trials(book(tmp_path, name="u.xlsx", **{"pCa_6.1": [lab.NAMES, *ROWS]}), pca=4.5)
+    assert "the sheet is called by pCa 6.1, the trial has 4.5; check both" in lab.told(alone)
 
 
 def test_text_numbers_units_and_preamble(tmp_path: Path) -> None:

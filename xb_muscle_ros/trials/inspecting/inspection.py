@@ -17,6 +17,7 @@ from xb_muscle_ros.trials.readers.assembly import trial_of
 from xb_muscle_ros.trials.readers.base import Reader
 from xb_muscle_ros.trials.readers.columns import BAG
 from xb_muscle_ros.trials.readers.contents import Contents
+from xb_muscle_ros.trials.readers.options import PATTERN
 from xb_muscle_ros.trials.readers.registry import READERS, reader_for
 from xb_muscle_ros.trials.readers.settings import ImportSettings
 from xb_muscle_ros.trials.study import trial_of_bag
@@ -73,7 +74,7 @@ def inspect_file(path: Path, file_format: str | None = None) -> Inspection:
     """
     reader = reader_for(path, file_format)
     contents = reader.contents(path)
-    recognition = recognise(contents)
+    recognition = recognise(contents, PATTERN in reader.takes)
     proposal = propose([path], reader, contents, recognition)
     trials, refused = ((), ()) if proposal.missing else imported(path, reader, proposal)
     replayed: tuple[str, ...] = ()

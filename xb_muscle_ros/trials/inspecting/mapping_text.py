@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 import yaml
 
+from xb_muscle_ros.trials.inspecting.names import NamePattern
+
 
 class Line(NamedTuple):
     """A line of the mapping; one that is not active stands as a comment."""
@@ -55,6 +57,13 @@ class Proposal:
         """Add a key whose value is a guess; `above` are the keys it stands below."""
         self.add(depth, f"{key}: {value}", f"guess: {why}")
         self.guesses.append(f"{above}{key}: {value} ({why})")
+
+    def pattern(self, depth: int, pattern: NamePattern) -> None:
+        """Add a pattern of names, and what numbers that it finds are multiplied with."""
+        self.add(depth, f"pattern: {scalar(pattern.pattern)}")
+        if pattern.factors:
+            factors = ", ".join(f"{key}: {value:g}" for key, value in pattern.factors.items())
+            self.add(depth, f"factors: {{{factors}}}")
 
     def fill_in(self, depth: int, key: str, allowed: str) -> None:
         """Add a key whose value is not known."""

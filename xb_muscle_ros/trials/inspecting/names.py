@@ -1,4 +1,4 @@
-"""Facts of a trial that stand in the names of files: pCa, and amplitude and recovery of the paper's protocol."""
+"""Facts of a trial in names of files, sheets and columns: pCa, and amplitude and recovery of the paper's protocol."""
 
 from __future__ import annotations
 
@@ -37,9 +37,36 @@ _PATTERNS: tuple[tuple[str, dict[str, float]], ...] = (
 
 
 def name_pattern(paths: Sequence[Path]) -> NamePattern | None:
-    """The first pattern that all names have, with a pCa that is one; None where there is none."""
+    """The first pattern that the names of all files have, with a pCa that is one; None where there is none."""
+    return pattern_in([name_of(path) for path in paths])
+
+
+def sheet_pattern(sheets: Sequence[str]) -> NamePattern | None:
+    """The same of several sheets, for their whole names."""
+    found = pattern_in(sheets) if len(sheets) > 1 else None
+    return None if found is None else found._replace(pattern=f".*{found.pattern}.*")
+
+
+def column_pattern(columns: Sequence[str]) -> NamePattern | None:
+    """The same of several columns that differ in the pCa alone, for their whole names."""
+    found = pattern_in(columns) if len(columns) > 1 else None
+    if found is None:
+        return None
+    around = {re.sub(found.pattern, "\0", name, count=1) for name in columns}
+    if len(around) > 1:
+        return None
+    before, _, after = around.pop().partition("\0")
+    return found._replace(pattern=f"{_plain(before)}{found.pattern}{_plain(after)}")
+
+
+def _plain(text: str) -> str:
+    return re.escape(text).replace("\\ ", " ")
+
+
+def pattern_in(names: Sequence[str]) -> NamePattern | None:
+    """The same of any names."""
     for pattern, factors in _PATTERNS:
-        found = [_found(pattern, factors, name_of(path)) for path in paths]
+        found = [_found(pattern, factors, name) for name in names]
         if found and all(each is not None for each in found):
             assert found[0] is not None  # all of them are
             return NamePattern(pattern, factors, found[0])

@@ -11,7 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from xb_muscle_ros.trials.inspecting.names import NamePattern, column_pattern
 from xb_muscle_ros.trials.inspecting.words import OTHER_UNITS, Named, fitting, read_name, roles_of_unit, units_meant
+from xb_muscle_ros.trials.readers.calcium import SAME_PCA, pcas_in
 from xb_muscle_ros.trials.readers.columns import SIGNALS
 from xb_muscle_ros.trials.readers.contents import Content, Contents
 from xb_muscle_ros.trials.readers.units import KINDS, UNITS, volts_of
@@ -53,6 +55,7 @@ class Recognition:
         units: of each signal by its label: that of its role, or as the file writes it; empty for none.
         remarks: what was decided and is worth a look, one line each.
         factors: of a role, how many of its base unit (m, N) make one of L0 or F0, where the file has both.
+        patterns: of a role with a column for each trial, what their names have in common; `roles` has the first.
     """
 
     roles: dict[str, Recognised] = field(default_factory=dict)
@@ -61,10 +64,16 @@ class Recognition:
     units: dict[str, str] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
     factors: dict[str, float] = field(default_factory=dict)
+    patterns: dict[str, NamePattern] = field(default_factory=dict)
 
 
-def recognise(contents: Contents) -> Recognition:
-    """Find the role of each signal that has one."""
+def recognise(contents: Contents, beside: bool = False) -> Recognition:
+    """Find the role of each signal that has one.
+
+    Args:
+        contents: of a file.
+        beside: an import of it can take a column for each trial.
+    """
     found = Recognition()
     candidates: dict[str, list[Recognised]] = {role: [] for role in SIGNALS}
     for content in contents.signals:
@@ -79,7 +88,7 @@ def recognise(contents: Contents) -> Recognition:
     for role, each in candidates.items():
         if role == "time" and any(content.times_s is not None for content in contents.signals):
             continue  # a bag's messages have stamps
-        _settle(found, role, each)
+        _settle(found, role, each, beside)
     return found
 
 
@@ -102,6 +111,9 @@ def _looked_at(content: Content) -> tuple[Recognised | None, str]:
         if len(by_unit) != 1:
             return None, f"its name may be that of {' or '.join(roles)}"
         roles = by_unit
+    if roles == ("calcium",) and _is_at_pca(content):
+        role = next((role for role in ("force", "length") if unit and fitting(unit, role)), "force")
+        return Recognised(content, role, fitting(unit, role) if unit else "", "called by a pCa", True, named), ""
     if roles:
         return _by_name(content, roles[0], unit, named)
     of_unit = roles_of_unit(unit) if unit else ()
@@ -109,6 +121,12 @@ def _looked_at(content: Content) -> tuple[Recognised | None, str]:
         why = f"by its unit {unit} alone"
         return Recognised(content, of_unit[0], fitting(unit, of_unit[0]), why, True, named), ""
     return None, "is the number of the trial" if "trial" in named.roles else _other(unit)
+
+
+def _is_at_pca(content: Content) -> bool:
+    """Whether a column is called by a pCa and holds something else, which was recorded at that pCa."""
+    told = () if content.field else pcas_in(content.name)
+    return len(told) == 1 and bool(np.any(np.abs(content.finite - told[0]) > SAME_PCA))
 
 
 def _by_name(content: Content, role: str, unit: str, named: Named) -> tuple[Recognised | None, str]:
@@ -142,14 +160,14 @@ def _other(unit: str) -> str:
     return f"not recognised; its unit is {other}" if other else f"not recognised; its unit is '{unit}'"
 
 
-def _settle(found: Recognition, role: str, candidates: list[Recognised]) -> None:
+def _settle(found: Recognition, role: str, candidates: list[Recognised], beside: bool) -> None:
     """Take the one candidate, or leave all of them open."""
     told = [one for one in candidates if one.content.told_role]
     named = told or [one for one in candidates if not one.is_guess]
     left = named or candidates
     for one in candidates:
         if not any(one is other for other in left):
-            what = "has a unit of" if one.is_guess else "is called"
+            what = "may be" if one.is_guess and not one.unit else "has a unit of" if one.is_guess else "is called"
             other = "the format tells of another" if told else "another signal has its name"
             found.taken_for[one.content.label] = f"{what} {role}; {other}"
     left = _measured(found, role, left)
@@ -157,12 +175,22 @@ def _settle(found: Recognition, role: str, candidates: list[Recognised]) -> None
     if len(left) == 1:
         found.roles[role] = left[0]
         found.taken_for[left[0].content.label] = f"{role} ({left[0].why})"
+    elif left and beside and (pattern := _pattern(left)) is not None:
+        found.roles[role], found.patterns[role] = left[0], pattern
+        for one in left:
+            found.taken_for[one.content.label] = f"{role} of a trial, whose pCa its name tells"
     elif left:
         found.unclear[role] = tuple(left)
         names = ", ".join(f"'{one.content.label}'" for one in left)
         for one in left:
             found.taken_for[one.content.label] = f"may be {role} ({one.why})"
         found.remarks.append(f"{names} may each be {role}; none is taken: name one in the mapping")
+
+
+def _pattern(candidates: list[Recognised]) -> NamePattern | None:
+    """What the names of columns have in common that hold one signal at several pCa."""
+    alike = len({one.unit for one in candidates}) == 1
+    return column_pattern([one.content.name for one in candidates]) if alike else None
 
 
 def _measured(found: Recognition, role: str, candidates: list[Recognised]) -> list[Recognised]:

@@ -67,6 +67,7 @@ OTHER_UNITS = {
 }  # fmt: skip
 _MASSES = ("kg", "g", "mg")
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[(\[{](?P<unit>[^()\[\]{}]*)[)\]}]\s*$")
+_INDEX = re.compile(r"(?=.*(?::|trial))[\d:,\s]*(?:trial)?[\d:,\s]*")
 _SLASH = re.compile(r"^(?P<name>.+?)\s+(?:/|in|,)\s+(?P<unit>\S+)$|^(?P<name2>.+?),\s*(?P<unit2>\S+)$")
 _END = re.compile(r"^(?P<name>.*[^\W_])[\s_]+(?P<unit>%?[^\W_][^\s_]*)$")
 
@@ -150,7 +151,9 @@ def _split(name: str) -> tuple[str, str]:
     """The name without its unit, and the unit as written."""
     match = _BRACKETS.match(name)
     if match is not None and match.group("unit").strip():
-        return match.group("name").strip(), match.group("unit").strip()
+        # force(:,trial) of MATLAB has an index there.
+        unit = "" if _INDEX.fullmatch(match.group("unit")) else match.group("unit").strip()
+        return match.group("name").strip(), unit
     for pattern in (_SLASH, _END):
         match = pattern.match(name)
         if match is None:

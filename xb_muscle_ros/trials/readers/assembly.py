@@ -14,7 +14,7 @@ from xb_muscle_ros.trials.checks import belied, unusual
 from xb_muscle_ros.trials.mains import hum_line, notched
 from xb_muscle_ros.trials.phases import conditioning
 from xb_muscle_ros.trials.readers.base import Draft, Recording, Signal
-from xb_muscle_ros.trials.readers.calcium import PCA_RANGE, read_calcium
+from xb_muscle_ros.trials.readers.calcium import PCA_RANGE, SAME_PCA, pcas_in, read_calcium
 from xb_muscle_ros.trials.readers.clock import check_gaps, read_clock, times_of
 from xb_muscle_ros.trials.readers.description import ImportMapping, filled
 from xb_muscle_ros.trials.readers.force import read_force
@@ -75,6 +75,7 @@ def made_of(recording: Recording, mapping: ImportMapping, path: Path, isometric_
     if signal is not None and signal.times is not None:
         _check_cover(draft, signal, clock.time_s, force_s)
     warn_of_force(draft, force_f0, calcium.pca)
+    _check_name(draft, calcium.pca, path)
     if signal is not None:
         warn_of_spikes(draft, signal, force_f0, SPIKE_F0, "F0")
     del force_f0
@@ -109,6 +110,16 @@ def made_of(recording: Recording, mapping: ImportMapping, path: Path, isometric_
     if line := hum_line(trial, mapping.notch_hz):
         draft.warn(line)
     return replace(trial, warnings=tuple(draft.warnings))
+
+
+def _check_name(draft: Draft, pca: float | None, path: Path) -> None:
+    """Warn where what a trial is called within its file tells another pCa."""
+    own = draft.recording.trial.removeprefix(filled(draft.mapping.trial, path))
+    told = pcas_in(own)
+    if pca is not None and len(told) == 1 and abs(told[0] - pca) > SAME_PCA:
+        draft.warn(
+            f"the name of the trial, '{draft.recording.trial}', tells pCa {told[0]:g}, it has {pca:g}; check both"
+        )
 
 
 def _with_shown_facts(draft: Draft, trial: Trial, path: Path, shown: Mapping[str, float | None]) -> Trial:

@@ -67,6 +67,7 @@ class Contents:
         facts: what the file tells beside its signals, by name, as text.
         others: what is there and is no signal, one line each.
         notes: what was wrong or found out, one line each.
+        sheets: of a workbook, those with the columns of the one that is shown, itself among them.
         rate: samples in a second and where that is told, where no signal has to tell the times.
         in_header: of ``f0`` and ``reference_length``, what an import takes from the file itself.
     """
@@ -79,3 +80,4 @@ class Contents:
     notes: tuple[str, ...] = ()
     in_header: tuple[str, ...] = ()
     rate: tuple[float, str] | None = None
+    sheets: tuple[str, ...] = ()

@@ -25,6 +25,7 @@ from xb_muscle_ros.trials.readers.mat_contents import grid_contents, mat_content
 from xb_muscle_ros.trials.readers.mat_file import MAT5, MAT73, load, names_of
 from xb_muscle_ros.trials.readers.mat_nodes import Struct, listed
 from xb_muscle_ros.trials.readers.mat_path import MatPath
+from xb_muscle_ros.trials.readers.mat_pca import check_pca, is_pca
 from xb_muscle_ros.trials.readers.mat_units import UNIT_NAMES, unit_beside
 from xb_muscle_ros.trials.readers.told_units import differing, told_of, told_unit
 from xb_muscle_ros.trials.trial import Array
@@ -106,16 +107,16 @@ class MatReader(Reader):
 
 
 def _content(path: Path, columns: list[str]) -> Struct:
-    """The variables that columns name, those that may tell units, and those of usual names; all, where one is missing.
+    """The variables that columns name, those that may tell units or pCa, and those of usual names.
 
-    A file may hold a film beside its numbers.
+    All, where one is missing. A file may hold a film beside its numbers.
     """
     roots = {_ROOT.match(text).group() for text in columns}  # type: ignore[union-attr]  # it matches anything
     wanted = {each.casefold() for each in (mat_grid.STRUCT, *UNIT_NAMES, *itertools.chain(*_USUAL.values()))}
     beside = {f"{root}_{unit}" for root in (*roots, *itertools.chain(*_USUAL.values())) for unit in UNIT_NAMES}
     wanted |= {name.casefold() for name in beside}
     names = names_of(path)
-    chosen = {name for name in names if name in roots or name.casefold() in wanted}
+    chosen = {name for name in names if name in roots or name.casefold() in wanted or is_pca(name)}
     return load(path, chosen | beside if roots <= set(names) else None)
 
 
@@ -191,6 +192,9 @@ def _recording(
     paths: Mapping[str, MatPath], content: Struct, i: int, mapping: ImportMapping, told: tuple[Path, str, str, Any]
 ) -> Recording:
     path, where, name, warnings = told
+    facts = mapping.facts_of(path)
+    if facts["pca"] is not None and mapping.calcium is None and mapping.activation is None:
+        check_pca(content, i, _count(paths, content, path), paths["length"], facts["pca"], where)
     found = {key: _values(each, content, i, where) for key, each in paths.items() if key != "trial"}
     count = found["length"].size
     time, line = _times(found.get("time"), count, mapping, paths, content, where)
@@ -206,7 +210,7 @@ def _recording(
         where,
         name,
         {key: Signal(mapping.columns[key].name, values, lambda i: f"sample {i + 1}") for key, values in found.items()},
-        mapping.facts_of(path),
+        facts,
         warnings=(*warnings, *line),
     )
 

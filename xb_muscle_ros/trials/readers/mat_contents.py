@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.trials.inspecting.words import read_name
 from xb_muscle_ros.trials.readers import mat_grid
 from xb_muscle_ros.trials.readers.contents import Content, Contents
 from xb_muscle_ros.trials.readers.mapping import build_mapping
 from xb_muscle_ros.trials.readers.mat_nodes import Node, Opaque, Struct, listed, shape_of
 from xb_muscle_ros.trials.readers.mat_path import MatPath
+from xb_muscle_ros.trials.readers.mat_pca import is_pca, leaves_of
 from xb_muscle_ros.trials.readers.mat_units import unit_beside
 from xb_muscle_ros.trials.trial import Array
 
 FORMAT = "MATLAB"
 # A matrix with more columns is none of signals.
 _MOST_COLUMNS = 32
-_DEEPEST = 4
 
 
 def grid_contents(path: Path, content: Struct) -> Contents:
@@ -49,11 +49,12 @@ def mat_contents(content: Struct) -> Contents:
     """Vectors, columns of matrices, and what holds no numbers."""
     signals: list[Content] = []
     others: list[str] = []
-    several = 0
-    for path, node, count in _leaves("", content, 0, 0):
-        several = max(several, count)
-        if isinstance(node, np.ndarray) and node.dtype != object and node.size > 1:
-            shown = _columns(path, node)
+    leaves = list(leaves_of("", content))
+    timed = any("time" in _roles(path) for path, _, _ in leaves)
+    several = max((max(count, _trials_in(path, node, timed)) for path, node, count in leaves), default=0)
+    for path, node, count in leaves:
+        if isinstance(node, np.ndarray) and node.dtype != object and (node.size > 1 or is_pca(path)):
+            shown = _signals(path, node, 0 if count else several, timed)
             signals += [Content(name, values, unit_beside(content, MatPath(name, "")) or "") for name, values in shown]
             others += [] if shown else [f"{path}: {shape_of(node)}"]
         elif isinstance(node, np.ndarray) and node.dtype != object and node.size == 1:
@@ -65,18 +66,40 @@ def mat_contents(content: Struct) -> Contents:
     return Contents(FORMAT, tuple(signals), tuple(str(i + 1) for i in range(several)), others=tuple(others))
 
 
-def _leaves(path: str, node: Node, depth: int, count: int) -> Iterator[tuple[str, Node, int]]:
-    """Paths to what is no struct, and over how many trials each runs; of an array of structs or cells, the first."""
-    if isinstance(node, dict) and depth <= _DEEPEST:
-        for name, child in node.items():
-            yield from _leaves(f"{path}.{name}" if path else name, child, depth + 1, count)
-    elif isinstance(node, np.ndarray) and node.dtype == object and node.size and not count:
-        yield from _leaves(path, node.ravel(order="F")[0], depth + 1, node.size if node.size > 1 else 0)
-    else:
-        yield path, node, count
+def _trials_in(path: str, node: Node, timed: bool) -> int:
+    """How many trials a matrix holds, one in each column or row: it is called by a signal and has no times in it.
+
+    Args:
+        path: of the matrix.
+        node: the matrix.
+        timed: times stand elsewhere.
+    """
+    if not isinstance(node, np.ndarray) or node.dtype == object or node.ndim != 2 or min(node.shape) < 2:
+        return 0
+    is_time = not timed and bool(np.all(np.diff(_first(node)) > 0.0))
+    return min(node.shape) if {"length", "force"} & set(_roles(path)) and not is_time else 0
 
 
-def _columns(path: str, node: Array) -> list[tuple[str, Array]]:
+def _roles(path: str) -> tuple[str, ...]:
+    return read_name(path.rpartition(".")[2]).roles
+
+
+def _by_column(node: Array) -> bool:
+    return node.shape[1] <= node.shape[0]
+
+
+def _first(node: Array) -> Array:
+    """The first trial in a matrix: samples are more than trials."""
+    values: Array = node[:, 0] if _by_column(node) else node[0]
+    return values
+
+
+def _signals(path: str, node: Array, several: int, timed: bool) -> list[tuple[str, Array]]:
+    """A vector, that of the first of several trials, or each column of a matrix."""
+    if several and _trials_in(path, node, timed):
+        return [(f"{path}({':,trial' if _by_column(node) else 'trial,:'})", _first(node))]
+    if is_pca(path) and node.size == several > 1:
+        return [(f"{path}(trial)", node.ravel()[:1])]
     if sum(n > 1 for n in node.shape) < 2:
         return [(path, node.ravel())]
     if node.ndim != 2 or node.shape[1] > _MOST_COLUMNS:

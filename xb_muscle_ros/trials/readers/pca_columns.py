@@ -21,6 +21,9 @@ def check_pca(table: Table, mapping: ImportMapping, part: Part, pca: float | Non
     """
     if mapping.calcium is not None or mapping.activation is not None or pca is None:
         return
+    told = pcas_in("" if table.name else table.sheet)  # the trial is called by `name`, and looked at by that
+    if len(told) == 1 and abs(told[0] - pca) > SAME_PCA:
+        yield f"{table.where}: the sheet is called by pCa {told[0]:g}, the trial has {pca:g}; check both"
     force = part.columns.get("force", "")
     patterns = [column.pattern for column in mapping.columns.values() if column.pattern is not None]
     others = []

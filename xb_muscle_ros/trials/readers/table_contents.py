@@ -21,12 +21,13 @@ _MOST_TEXTS = 5
 
 
 def table_contents(path: Path, tables: Iterator[Table]) -> Contents:
-    """Columns of the first of some tables in the order of the file; others are named.
+    """Columns of the table that names most signals of a recording, of several the first; others are named.
 
     Raises:
         UserError: see the reader of the tables.
     """
-    table = next(tables)
+    every = list(tables)
+    table = max(every, key=_signals_named)
     rows = table.rows
     columns, others = [], []
     for i, header in enumerate(table.header):
@@ -38,12 +39,20 @@ def table_contents(path: Path, tables: Iterator[Table]) -> Contents:
             continue
         unit = table.units[i].strip("()[] ") if table.units and not read_name(name).unit else ""
         columns.append(Content(name, values, unit, faults=tuple(_faults(table, name, values)), at=table.place))
-    others += [f"{more.where} is a table as well; its signals are not shown" for more in tables]
+    others += [f"{more.where} is a table as well; its signals are not shown" for more in every if more is not table]
+    alike = tuple(each.sheet for each in every if each.sheet and each.header == table.header)
     mark = "comma" if table.decimal == COMMA else "point"
     sheet = f"sheet '{table.sheet}', " if table.sheet else ""
     form = f"{sheet}decimal {mark}, {len(rows)} rows"
     facts = {} if table.sheet else dict(_facts(path))
-    return Contents(form, tuple(columns), facts=facts, others=tuple(others), notes=table.notices, rate=table.rate)
+    return Contents(
+        form, tuple(columns), facts=facts, others=tuple(others), notes=table.notices, rate=table.rate, sheets=alike
+    )
+
+
+def _signals_named(table: Table) -> int:
+    """How many signals the columns of a table are called after."""
+    return len({role for name in table.header for role in read_name(name).roles})
 
 
 def _text_column(name: str, different: list[str]) -> str:
