@@ -88,6 +88,44 @@ def test_a_sheet_that_is_called_by_another_pca_is_told(tmp_path: Path) -> None:
     assert "the sheet is called by pCa 6.1, the trial has 4.5; check both" in lab.told(alone)
 
 
+@pytest.mark.parametrize("number_format", ["0.00%", "0%", '0.000%" of L0"'])
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        ([("time_s", ""), ("length (% L0)", ""), ("force (% F0)", "")], "as its header says: 5 % is read as 5"),
+        ([("time", "s"), ("length", "%L0"), ("force", "%F0")], "as its header says: 5 % is read as 5"),
+        ([("time_s", ""), ("length (L0)", ""), ("force (F0)", "")], "have no % in the header: 5 % is read as 0.05"),
+    ],
+)
+def test_cells_that_show_percent(tmp_path: Path, number_format: str, names: list[tuple[str, str]], told: str) -> None:
+    heads = [[name for name, _ in names], *([[unit for _, unit in names]] if names[0][1] else [])]
+    rows = [[t, length / 1.2, f / 10.0] for t, length, f in ROWS]
+    path = book(tmp_path, run=[*heads, *rows])
+    made = openpyxl.load_workbook(path)
+    for row in made["run"].iter_rows(min_row=len(heads) + 1, min_col=2):
+        for cell in row:
+            cell.number_format = number_format
+    made.save(path)
+    columns = {"time": {"column": names[0][0]}, "length": {"column": names[1][0]}, "force": {"column": names[2][0]}}
+    (trial,) = lab.trials(path, columns=columns, f0=None, reference_length=None)
+    assert trial.length_change_l0 == pytest.approx(lab.LENGTH_MM / 1.2 - 1.0, abs=1e-12)
+    assert trial.force_n == pytest.approx(lab.FORCE_MN / 10.0, rel=1e-12)
+    assert lab.told(trial).count(told) == 2
+
+
+@pytest.mark.parametrize("number_format", ["0.00", '0.0" %"', "0.0\\%"])
+def test_a_sign_of_percent_that_is_text_is_none(tmp_path: Path, number_format: str) -> None:
+    path = book(tmp_path, run=[["time_s", "length (%L0)"], *([t, 100 * length / 1.2] for t, length, _ in ROWS)])
+    made = openpyxl.load_workbook(path)
+    for row in made["run"].iter_rows(min_row=2, min_col=2):
+        row[0].number_format = number_format
+    made.save(path)
+    columns = {"time": {"column": "time_s"}, "length": {"column": "length (%L0)"}}
+    (trial,) = lab.trials(path, columns=columns, f0=None, reference_length=None)
+    assert trial.length_change_l0 == pytest.approx(lab.LENGTH_MM / 1.2 - 1.0, abs=1e-12)
+    assert "show percent" not in lab.told(trial)
+
+
 def test_text_numbers_units_and_preamble(tmp_path: Path) -> None:
     text = [[repr(t).replace(".", ","), length, str(f)] for t, length, f in ROWS]
     path = book(tmp_path, s=[["Rig"], [], ["Sampling rate", 1000, "Hz"], ["t", "L", "F"], ["s", "mm", "mN"], *ROWS])
