@@ -21,6 +21,8 @@ _PLACE = re.compile(r"([A-Z]+)(\d+)")
 _ANY = re.compile(rb"<(?:\w+:)?f[\s/>]")
 # Two of the formats that every workbook has.
 _PERCENT = frozenset(("9", "10"))
+# A column has one format as a rule.
+_LOOKED_AT = 1000
 # Text and single characters that a format shows as they are.
 _SHOWN = re.compile(r'"[^"]*"|\\.')
 
@@ -37,13 +39,15 @@ def with_formulas(path: Path, sheet: str, rows: list[list[Any]]) -> list[list[An
 
 
 def percent_columns(path: Path, sheet: str) -> frozenset[int]:
-    """Columns, from 0, most of whose numbers are formatted as percent; none where the workbook is of another kind."""
+    """Columns, from 0, most of whose first numbers are formatted as percent; none where the workbook is of another kind."""
     try:
         with zipfile.ZipFile(path) as archive:
             styles = _percent_styles(archive)
             part = _part_of(archive, sheet) if styles else None
             counts, percent = Counter[int](), Counter[int]()
-            for column, _, cell in _cells(archive, part) if part else ():
+            for column, row, cell in _cells(archive, part) if part else ():
+                if row >= _LOOKED_AT:
+                    break
                 if cell.get("t", "n") == "n" and _value(cell):
                     counts[column] += 1
                     percent[column] += cell.get("s") in styles
