@@ -39,7 +39,7 @@ def with_formulas(path: Path, sheet: str, rows: list[list[Any]]) -> list[list[An
 
 
 def percent_columns(path: Path, sheet: str) -> frozenset[int]:
-    """Columns, from 0, most of whose first numbers are formatted as percent; none where the workbook is of another kind."""
+    """Columns, from 0, most of whose first numbers show percent; none where the workbook is of another kind."""
     try:
         with zipfile.ZipFile(path) as archive:
             styles = _percent_styles(archive)
