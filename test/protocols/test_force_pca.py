@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -76,3 +78,14 @@ def test_a_pca50_at_the_end_of_the_levels_is_none(model: str, pca: list[float]) 
     (found,) = xb.run_protocol("force-pca", "18Dec2017a", model=model, pca=pca, tell=told.append).results
     assert found.numbers["pca50"].value is None
     assert any("lies beyond the levels of pCa" in line for line in told)
+
+
+def test_force_that_still_rises_is_told() -> None:
+    told: list[str] = []
+    trials = []
+    for pca in PCAS:
+        made = recorded(pca, curve(pca, 6.1, 2.7))
+        trials.append(replace(made, force_n=made.force_n * (1.0 - np.exp(-made.force_time_s / 0.5))))
+    (found,) = xb.analyse_protocol("force-pca", trials, tell=told.append).results
+    assert found.numbers["maximal_f0"].value == pytest.approx(0.94, abs=0.02)
+    assert any("isometric force, of trial pca4.5" in line and "has not settled at first" in line for line in told)

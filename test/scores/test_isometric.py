@@ -105,6 +105,34 @@ def test_a_fibre_in_its_bath_has_the_mean_of_four_fifths() -> None:
     assert isometric_force(trial, TIME, force) == pytest.approx((0.5, None, ""))
 
 
+def test_a_fibre_that_has_not_come_to_rest_has_the_force_of_its_steady_part() -> None:
+    """A rise towards 1 F0 with 0.5 s: over all of the record the mean is 0.83."""
+    noise = 2e-3 * np.random.default_rng(0).standard_normal(TIME.size)
+    force = 1.0 - np.exp(-TIME / 0.5) + noise
+    found = isometric_force(fibre(force, Phase("isometric", 0.0, 3.0)), TIME, force)
+    assert found.value == pytest.approx(0.98, abs=0.015)
+    assert found.why.startswith("force has not settled at first: it rises by 0.")
+    slow = 1.0 - np.exp(-TIME / 3.0) + noise
+    none = isometric_force(fibre(slow, Phase("isometric", 0.0, 3.0)), TIME, slow)
+    assert none.value is None
+    assert none.why.startswith("force has not settled at constant calcium: it rises by 0.5")
+
+
+@pytest.mark.parametrize("noise_f0", [0.002, 0.02, 0.1])
+def test_noise_is_no_rise(noise_f0: float) -> None:
+    for seed in range(20):
+        force = 0.1 + noise_f0 * np.random.default_rng(seed).standard_normal(TIME.size)
+        trial = fibre(force, Phase("isometric", 0.0, 1.0), Phase("test_stretch", 1.0, 1.1))
+        assert steady_part(trial, TIME, force) == (slice(0, 801), "", "")
+
+
+def test_a_spike_is_no_rise() -> None:
+    force = np.full(TIME.size, 0.1)
+    force[[400, 401, 800]] = 2.0
+    trial = fibre(force, Phase("isometric", 0.0, 1.0), Phase("test_stretch", 1.0, 1.1))
+    assert steady_part(trial, TIME, force) == (slice(0, 801), "", "")
+
+
 def test_none_is_told_with_its_reason() -> None:
     force = np.ones(TIME.size)
     assert steady_part(fibre(force), TIME, force).why == "the phases of the trial are not known"

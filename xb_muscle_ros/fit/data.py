@@ -118,7 +118,7 @@ def _fit_trial(trial: Trial, order: int, held_out: bool, whole: bool, weight: fl
     # Nothing after the window bears on the force within it.
     last = min(int(np.searchsorted(trial.time_s, late - 5e-10)) + 1, trial.time_s.size)
     pca, phases = trial.facts.pca, trial.facts.phases
-    steady, why = steady_part(trial, trial.force_time_s, trial.measured_f0)
+    steady, why, _ = steady_part(trial, trial.force_time_s, trial.measured_f0)
     return FitTrial(
         name=name,
         solution="changing" if pca is None else f"pCa {pca:g}",

@@ -11,7 +11,7 @@ from scipy.stats import t as student
 from xb_muscle_ros.protocols.base import Cell, Column, Curve, Found, Number, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.figures import legend, lettered, looks
 from xb_muscle_ros.protocols.inputs import pca_option, planned_at_each_pca, rate_option
-from xb_muscle_ros.scores.estimate import Missing
+from xb_muscle_ros.scores.estimate import Missing, notes_of
 from xb_muscle_ros.scores.force_pca import fit_force_pca, hill_curve
 from xb_muscle_ros.scores.readout import isometric_force
 from xb_muscle_ros.trials.protocol import ALLOWED
@@ -52,12 +52,13 @@ class ForcePca(Protocol):
     def analyse(self, fibre: str, of: str, runs: Sequence[Run]) -> Found:
         """Mean steady force of each trial, and Hill's equation through the means of each pCa."""
         rows: list[Mapping[str, Cell]] = []
-        notes = []
+        notes: list[tuple[str, str]] = []
         for run in runs:
             steady = isometric_force(run.trial, run.time_s, run.force_f0, run.noise)
             rows.append({"trial": run.trial.facts.trial, "pca": run.trial.facts.pca, "force_f0": steady})
-            if steady.value is None:
-                notes.append(f"trial {run.trial.facts.trial}: {steady.why}")
+            if steady.why:
+                notes.append((run.trial.facts.trial, f"isometric force: {steady.why}"))
+        lines = notes_of(notes)
         found = Found(fibre, of, tuple(rows), runs=tuple(runs))
         pca, force = found.column("pca"), found.column("force_f0")
         levels = np.unique(np.round(pca[np.isfinite(pca) & np.isfinite(force)], 6))
@@ -66,7 +67,7 @@ class ForcePca(Protocol):
         if isinstance(fit, Missing):
             numbers = {key: Number(None, why=fit.why) for key in self.numbers}
             return Found(
-                fibre, of, tuple(rows), numbers, runs=tuple(runs), notes=(*notes, f"Hill's equation: {fit.why}")
+                fibre, of, tuple(rows), numbers, runs=tuple(runs), notes=(*lines, f"Hill's equation: {fit.why}")
             )
         width = float(student.ppf(0.975, max(levels.size - _FITTED, 1)))
         numbers = {
@@ -78,7 +79,7 @@ class ForcePca(Protocol):
         }
         x = np.linspace(float(levels[0]), float(levels[-1]), 300)
         curve = Curve(x, hill_curve(x, fit.pca50, fit.n_hill, fit.passive_f0, fit.maximal_f0))
-        return Found(fibre, of, tuple(rows), numbers, {"hill": curve}, tuple(runs), tuple(notes))
+        return Found(fibre, of, tuple(rows), numbers, {"hill": curve}, tuple(runs), tuple(lines))
 
     def draw(self, figure: Any, found: Sequence[Found]) -> None:
         """Force against pCa, high calcium to the right as is usual, and where the curve leaves the points."""

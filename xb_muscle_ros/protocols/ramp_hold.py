@@ -120,7 +120,7 @@ def _row(run: Run) -> tuple[Mapping[str, Cell], list[str]]:
     facts = run.trial.facts
     before = isometric_force(run.trial, run.time_s, run.force_f0, run.noise)
     row: dict[str, Cell] = {"trial": facts.trial, "pca": facts.pca, "isometric_f0": before}
-    whys = [f"isometric force: {before.why}"] if before.value is None else []
+    whys = [f"isometric force: {before.why}"] if before.why else []
     phase = _ramp(run)
     if phase is None:
         return row, [*whys, "ramp: there is no single stretch or shortening"]

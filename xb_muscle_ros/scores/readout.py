@@ -30,10 +30,11 @@ def isometric_force(trial: Trial, time_s: Array, force_f0: Array, noise: ForceNo
         trial, time_s, force_f0: see `steady_part`.
         noise: of the force; None for simulated force.
     """
-    inside, why = steady_part(trial, time_s, force_f0)
+    inside, why, told = steady_part(trial, time_s, force_f0)
     if why:
         return Estimate(None, why=why)
-    return Estimate(float(np.mean(force_f0[inside])), None if noise is None else noise.of_mean(time_s[inside]))
+    se = None if noise is None else noise.of_mean(time_s[inside])
+    return Estimate(float(np.mean(force_f0[inside])), se, told)
 
 
 def read_off(trial: Trial, time_s: Array, force_f0: Array, noise: ForceNoise | None = None) -> dict[str, Estimate]:
@@ -65,7 +66,8 @@ def read_off_measured(trial: Trial) -> dict[str, Estimate]:
     found = read_off(trial, trial.force_time_s, trial.measured_f0, noise)
     if noise is not None:
         return found
-    return {name: each if each.value is None else each._replace(why=NO_NOISE_KNOWN) for name, each in found.items()}
+    unknown = {name: "; ".join(filter(None, (each.why, NO_NOISE_KNOWN))) for name, each in found.items()}
+    return {name: each if each.value is None else each._replace(why=unknown[name]) for name, each in found.items()}
 
 
 def references(trials: Sequence[Done]) -> list[int | None]:

@@ -264,7 +264,7 @@ def test_noise_is_not_less_than_what_steady_force_scatters_by(made: Any) -> None
             force = np.where(times < 0.09, 0.1, quiet.force_n) + noise
             trials.append(replace(quiet, facts=replace(quiet.facts, phases=phases), length_m=length, force_n=force))
         for trial, noise_of_trial in zip(trials, noise_of(trials).trials, strict=True):
-            inside, _ = steady_part(trial, times, trial.force_n)
+            inside = steady_part(trial, times, trial.force_n).inside
             steady_s, steady = times[inside], trial.force_n[inside]
             line = np.polyval(np.polyfit(steady_s, steady, 1), steady_s)
             assert noise_of_trial.sd_f0 > 0.999 * float(np.sqrt(np.sum((steady - line) ** 2) / (steady.size - 2)))

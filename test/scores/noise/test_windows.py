@@ -14,10 +14,10 @@ from xb_muscle_ros.trials.trial import Phase, Trial
 
 def test_window_of_a_trial() -> None:
     trial = StretchShortenStretch(0.0383, 0.5).trial("made", 6.0)
-    made = replace(trial, force_time_s=trial.time_s, force_n=np.arange(trial.time_s.size, dtype=np.float64))
+    made = replace(trial, force_time_s=trial.time_s, force_n=1e4 + np.arange(trial.time_s.size, dtype=np.float64))
     window = isometric_window(made)
     assert (window.trial, window.step_s) == (trial.facts.trial, pytest.approx(1e-3))
-    assert window.force_f0.tolist() == list(range(81))
+    assert window.force_f0.tolist() == list(range(10_000, 10_081))
 
 
 def test_window_late_in_a_pause_where_a_trial_begins_with_a_stretch() -> None:

@@ -71,7 +71,7 @@ def noise_of(trials: Sequence[Trial]) -> NoiseModel:
 
 def steady_scatter_f0(trial: Trial) -> float:
     """Standard deviation of steady force around a straight line, F0; 0 where too little of it is steady."""
-    inside, _ = steady_part(trial, trial.force_time_s, trial.measured_f0)
+    inside = steady_part(trial, trial.force_time_s, trial.measured_f0).inside
     force = trial.measured_f0[inside]
     if force.size < _LEAST_STEADY:
         return 0.0

@@ -39,7 +39,7 @@ def isometric_window(trial: Trial, most: int = MOST) -> Window:
         most: samples it has at most, the last.
     """
     time_s = trial.force_time_s
-    inside, _ = steady_part(trial, time_s, trial.measured_f0)
+    inside = steady_part(trial, time_s, trial.measured_f0).inside
     if inside.stop - inside.start < LEAST:
         pauses = [p for p in trial.facts.phases if p.name in ("isometric", "recovery", "hold")]
         longest = max(pauses, key=lambda p: p.end_s - p.start_s, default=None)
