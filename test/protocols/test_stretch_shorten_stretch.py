@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from matplotlib.figure import Figure
 
+import xb_muscle_ros as xb
 from xb_muscle_ros.protocols.base import MEASURED, Found
 from xb_muscle_ros.protocols.registry import PROTOCOLS
 from xb_muscle_ros.scores.readout import SRS_TEST
@@ -29,3 +30,11 @@ def test_each_recovery_time_is_a_tick_even_where_a_decade_holds_them_all() -> No
 @pytest.mark.parametrize("rows", [[(6.1, 0.0), (6.1, 0.1)], [(None, 0.1)], [(6.1, None)]])
 def test_one_pca_or_none_needs_no_name(rows: list[tuple[float | None, float | None]]) -> None:
     assert drawn(rows)[1] == []
+
+
+def test_an_srs_of_too_few_samples_is_told() -> None:
+    made = xb.run_protocol("stretch-shorten-stretch", "18Dec2017a", as_measured=True, rate=250, tell=lambda line: None)
+    told: list[str] = []
+    xb.analyse_protocol("stretch-shorten-stretch", made, tell=told.append)
+    for text in ("SRS, conditioning", "SRS, test"):
+        assert any(text in line and "in the first 10 ms of the stretch; 3 are needed" in line for line in told)

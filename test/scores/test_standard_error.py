@@ -249,10 +249,14 @@ def test_text_of_errors_and_marks() -> None:
     assert told == ["2 ± 5.1*", "-9 ± 5.1", "2", "–"]
 
 
-def test_notes_of_one_kind_are_one_line() -> None:
+def test_notes_of_one_reason_are_one_line() -> None:
     assert notes_of([("a", "SRS: x"), ("b", "SRS: y"), ("b", "k_tr: z"), ("c", "SRS: x")]) == [
-        "SRS, of trial a, and of 2 more trials: x",
+        "SRS, of trial a, and of c: x",
+        "SRS, of trial b: y",
         "k_tr, of trial b: z",
+    ]
+    assert notes_of([("a", "k_tr: 0.144 s"), ("b", "k_tr: 0.15 s"), ("c", "k_tr: 1e-3 s")]) == [
+        "k_tr, of trial a, and of 2 more trials: 0.144 s (in the first; in others with other numbers)"
     ]
 
 

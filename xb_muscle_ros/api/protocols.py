@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -190,8 +190,7 @@ def run_protocol(
             each(run)
     told = [pushing(run.trial, run.simulated, whose.model) for run in runs if run.simulated is not None]
     lines.say(*one_for_all([line for line in told if line]))
-    found = chosen.analyse(whose.name, whose.model, runs)
-    found = replace(found, notes=(*lacking, *found.notes))
+    found = running.analysed(chosen, whose.name, whose.model, runs, lacking)
     lines.say(*found.notes)
     return ProtocolResult(chosen.name, (found,), tuple(lines))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from xb_muscle_ros.cli import common
@@ -54,6 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     from xb_muscle_ros.protocols import report
     from xb_muscle_ros.protocols.base import settings_of
     from xb_muscle_ros.protocols.registry import all_options, protocol_of
+    from xb_muscle_ros.protocols.running import analysed
     from xb_muscle_ros.simulation.offline import one_for_all, pushing
     from xb_muscle_ros.trials.bag_files import remove_results
     from xb_muscle_ros.trials.bags import write_trial
@@ -87,8 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
     for line in lacking:
         common.warn(line)
     if told:
-        found = protocol.analyse(fibre.name, fibre.model, runs)
-        found = replace(found, notes=(*lacking, *found.notes))
+        found = analysed(protocol, fibre.name, fibre.model, runs, lacking)
         for note in found.notes[len(lacking) :]:
             common.warn(note)
         print(ProtocolResult(protocol.name, (found,)))

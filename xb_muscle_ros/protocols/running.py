@@ -9,7 +9,25 @@ from functools import partial
 from xb_muscle_ros.models.fibre_file import Fibre
 from xb_muscle_ros.models.muscle import Muscle
 from xb_muscle_ros.protocols.base import MEASURED, Found, NoAnswer, Planned, Protocol, Run, measured
+from xb_muscle_ros.scores.estimate import Estimate, notes_of, without_numbers
 from xb_muscle_ros.trials.trial import Trial
+
+
+def analysed(protocol: Protocol, fibre: str, of: str, runs: Sequence[Run], lacking: Sequence[str] = ()) -> Found:
+    """What a protocol reads off runs; whatever a cell of the table has to say is a note.
+
+    Args:
+        lacking: notes on what there is no run of.
+    """
+    found = protocol.analyse(fibre, of, runs)
+    said = "\n".join(without_numbers(note) for note in found.notes)
+    told = [
+        (str(row.get("trial", "")), f"{column.text}: {cell.why}")
+        for row in found.rows
+        for key, column in protocol.columns.items()
+        if isinstance(cell := row.get(key), Estimate) and cell.why and without_numbers(cell.why) not in said
+    ]
+    return replace(found, notes=(*lacking, *found.notes, *notes_of(told)))
 
 
 def answers(
@@ -78,10 +96,9 @@ def with_force(run: Run, fibre: Fibre, as_measured: bool) -> Run:
 def read_measured(protocol: Protocol, fibre: str, trials: Sequence[Trial]) -> Found:
     """What recordings of one fibre show; those without force are left out and named in a note."""
     having = [trial for trial in trials if trial.force_time_s.size]
-    found = protocol.analyse(fibre, MEASURED, [measured(trial) for trial in having])
     lacking = [trial.facts.trial for trial in trials if not trial.force_time_s.size]
     notes = [f"trial {name} has no measured force and is left out" for name in lacking]
-    return replace(found, notes=(*notes, *found.notes))
+    return analysed(protocol, fibre, MEASURED, [measured(trial) for trial in having], notes)
 
 
 def read_model(protocol: Protocol, fibre: Fibre, trials: Sequence[Trial], settle_s: float | None = None) -> Found:
@@ -95,7 +112,7 @@ def read_model(protocol: Protocol, fibre: Fibre, trials: Sequence[Trial], settle
     asked = (partial(protocol.repeat, muscle, trial, settle_s) for trial in trials)
     name = trials[0].facts.fibre
     try:
-        found = protocol.analyse(name, fibre.model, list(answered(asked, lacking)))
+        runs = list(answered(asked, lacking))
     except NoAnswer:
-        found = Found(name, fibre.model, ())
-    return replace(found, notes=(*lacking, *found.notes))
+        return Found(name, fibre.model, (), notes=tuple(lacking))
+    return analysed(protocol, name, fibre.model, runs, lacking)

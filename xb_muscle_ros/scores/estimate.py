@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from xb_muscle_ros.tables import unsound
+
+# A number within a reason, with its sign and exponent.
+_NUMBER = re.compile(r"[-−]?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
 class Estimate(NamedTuple):
@@ -16,7 +20,8 @@ class Estimate(NamedTuple):
         value: None where there is none.
         se: standard error, in the unit of the value; None where it is not known, and for simulated forces, which have
             no noise.
-        why: why there is no value, or no standard error of a measured one; empty where there is nothing to say.
+        why: why there is no value, or no standard error of a measured one, or what was left out for it; empty where
+            there is nothing to say.
     """
 
     value: float | None
@@ -58,18 +63,24 @@ def quotient(value: Estimate, reference: Estimate) -> Estimate:
     return Estimate(ratio, rounded(math.hypot(value.se, ratio * reference.se) / abs(reference.value)))
 
 
+def without_numbers(text: str) -> str:
+    """A text by which those that differ in numbers alone are the same."""
+    return _NUMBER.sub("#", text)
+
+
 def notes_of(told: Sequence[tuple[str, str]]) -> list[str]:
-    """Lines on numbers that are missing, those of one kind in one line.
+    """Lines on numbers that are missing, those that are missing for one reason in one line.
 
     Args:
-        told: of each the trial, and ``what: why``.
+        told: of each the trial, and ``what: why``. Reasons that differ in numbers alone are one.
     """
-    kinds: dict[str, list[tuple[str, str]]] = {}
+    kinds: dict[tuple[str, str], list[tuple[str, str]]] = {}
     for trial, line in told:
         what, _, why = line.partition(": ")
-        kinds.setdefault(what, []).append((trial, why))
+        kinds.setdefault((what, without_numbers(why)), []).append((trial, why))
     lines = []
-    for what, found in kinds.items():
+    for (what, _), found in kinds.items():
         more = f", and of {len(found) - 1} more trials" if len(found) > 2 else f", and of {found[-1][0]}"
-        lines.append(f"{what}, of trial {found[0][0]}{more if len(found) > 1 else ''}: {found[0][1]}")
+        other = "" if all(why == found[0][1] for _, why in found) else " (in the first; in others with other numbers)"
+        lines.append(f"{what}, of trial {found[0][0]}{more if len(found) > 1 else ''}: {found[0][1]}{other}")
     return lines
