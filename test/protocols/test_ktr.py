@@ -56,6 +56,38 @@ def test_a_trial_without_release_is_a_note() -> None:
     assert "no release by 5 % L0" in found.notes[0]
 
 
+def test_what_comes_back_is_read_before_the_fibre_moves_again() -> None:
+    """Regression: a stretch late in the record, and the force after it, counted as force that came back."""
+    trial = recorded(6.0, 4.5)
+    late = trial.time_s > 4.0
+    moved = replace(trial, length_m=trial.length_m + 0.05 * late, force_n=trial.force_n + 0.6 * late)
+    (found,) = xb.analyse_protocol("ktr", [moved], tell=lambda line: None).results
+    back = found.rows[0]["redeveloped"]
+    assert back.value == pytest.approx(1.0, abs=0.002)
+    assert 0.0 < back.se < 0.01
+    assert found.rows[0]["k_tr_per_s"].value == pytest.approx(6.0, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("step_l0", "line"),
+    [
+        (-0.20, "the fibre is released 2 times, at 0.101, 0.23 s; k_tr is that of one release"),
+        (0.03, "force is followed for 0.1"),
+    ],
+)
+def test_a_second_movement_is_named(step_l0: float, line: str) -> None:
+    """Regression: force was said to be followed for a short time, or no release to be taken back, and no more."""
+    trial = recorded(6.0, 4.5)
+    again = (trial.time_s >= 0.23) & (trial.time_s < 0.26)
+    moved = replace(trial, length_m=trial.length_m + step_l0 * again)
+    told: list[str] = []
+    (found,) = xb.analyse_protocol("ktr", [moved], tell=told.append).results
+    assert found.rows[0]["k_tr_per_s"].value is None
+    (said,) = (each for each in told if "k_tr, of trial" in each)
+    assert line in said
+    assert step_l0 < 0.0 or "(length moves again at 0.229 s)" in said
+
+
 def test_measured_fibre(shared_data: Path, repo_root: Path, tmp_path: Path) -> None:
     """Of ACB11, 15 °C: 5.5 ± 0.3 1/s at pCa 4.5 and 1.27 at pCa 6.6, as `evaluate` finds."""
     from xb_muscle_ros.cli.main import main

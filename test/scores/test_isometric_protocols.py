@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,7 +13,8 @@ from xb_muscle_ros.scores.enhancement import Enhancement, Side, enhancement
 from xb_muscle_ros.scores.estimate import Missing
 from xb_muscle_ros.scores.force_pca import ForcePca, fit_force_pca, hill_curve
 from xb_muscle_ros.scores.redevelopment import Redevelopment, redevelopment, restretch_end, still_until
-from xb_muscle_ros.trials.trial import Array
+from xb_muscle_ros.scores.standard_error import force_noise
+from xb_muscle_ros.trials.trial import Array, Phase, Trial, TrialFacts
 
 PCA = np.array([4.5, 6.0, 6.2, 6.4, 6.6, 9.0])
 TIME = np.arange(6001) * 1e-3
@@ -84,13 +87,50 @@ def test_the_end_of_a_restretch_is_found() -> None:
         released(step=0.04),
         released(hold_s=0.6),
         np.where(TIME > 1.0, -0.2, 0.0),
-        released() + np.roll(released(), 2000),
         -released(),
         np.zeros(2),
     ],
 )
 def test_other_movements_are_no_release_and_restretch(length: Array) -> None:
-    assert restretch_end(TIME[: length.size], length) is None
+    found = restretch_end(TIME[: length.size], length)
+    assert isinstance(found, Missing)
+    assert "no release by 5 % L0 or more that is taken back within 0.5 s" in found.why
+
+
+def test_two_releases_are_told() -> None:
+    found = restretch_end(TIME, released() + np.roll(released(), 2000))
+    assert isinstance(found, Missing)
+    assert "released 2 times, at 1, 3 s" in found.why
+
+
+@pytest.mark.parametrize("seed", [0, 7, 10, 11])
+def test_a_long_noisy_record_is_fitted_without_overflow(seed: int) -> None:
+    """Regression: on its way a fit tries exp(-k·t) with k far below zero."""
+    time_s = np.arange(4000) * 0.02
+    force = 1.0 - 0.4 * np.exp(-0.6 * time_s) + 0.2 * np.random.default_rng(seed).standard_normal(time_s.size)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = redevelopment(time_s, force, 0.0, 80.0)
+    assert isinstance(found, Redevelopment)
+    assert abs(found.k_per_s - 0.6) < 4.0 * found.se_per_s
+
+
+@pytest.mark.parametrize(("drift_per_s", "told"), [(0.0, False), (-0.01, True), (0.01, True)])
+def test_a_drift_of_force_is_told(drift_per_s: float, told: bool) -> None:
+    """A hundredth of F0 per second moves k_tr of 3 1/s by 3 standard errors and more."""
+    rest = TIME < 1.0
+    count = 0
+    for seed in range(10):
+        noise = 0.004 * np.random.default_rng(seed).standard_normal(TIME.size)
+        force = recovering(3.0) + drift_per_s * TIME + noise
+        trial = Trial(
+            TrialFacts("f", "t", phases=(Phase("isometric", 0.0, 1.0),)),
+            TIME[rest], np.ones(rest.sum()), np.zeros(1), np.ones(1), TIME[rest], noise[rest] + 0.9,
+        )  # fmt: skip
+        found = redevelopment(TIME, force, 1.02, 6.0, force_noise(trial))
+        assert isinstance(found, Redevelopment)
+        count += "with a straight line k_tr is" in found.told
+    assert count == 10 if told else count <= 1
 
 
 def test_the_fit_ends_where_the_fibre_is_moved_again() -> None:

@@ -10,17 +10,15 @@ import numpy as np
 from xb_muscle_ros.protocols.base import Cell, Column, Found, Number, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.figures import legend, lettered, looks
 from xb_muscle_ros.protocols.inputs import pca_option, planned_at_each_pca, rate_option
-from xb_muscle_ros.scores.estimate import notes_of
+from xb_muscle_ros.scores.estimate import Estimate, Missing, notes_of, quotient
 from xb_muscle_ros.scores.readout import isometric_force
-from xb_muscle_ros.scores.redevelopment import LONGEST_RELEASE_S, SMALLEST_RELEASE_L0, redevelopment_rate, restretch_end
+from xb_muscle_ros.scores.redevelopment import redevelopment_rate, restretch_end, still_until
 from xb_muscle_ros.trials.protocol import ALLOWED, Allowed
 
 # As in k_tr recordings of rat soleus: a fifth of the length, for 20 ms.
 RELEASE_L0, RAMP_S, SLACK_S = 0.20, 0.001, 0.020
-_NO_RELEASE = (
-    f"there is no release by {100.0 * SMALLEST_RELEASE_L0:g} % L0 or more that is taken back within "
-    f"{LONGEST_RELEASE_S:g} s"
-)
+# Force at the end is a mean over this share of the time that it is followed.
+_LAST = 0.02
 # Of redevelopment so many of its time constants are drawn.
 _DRAWN = 5.0
 
@@ -76,10 +74,12 @@ class RedevelopmentRates(Protocol):
             rate = redevelopment_rate(run.trial, run.time_s, run.force_f0, run.noise)
             if run.simulated is not None:
                 rate = rate._replace(se=None)  # what an exponential misses is no noise
-            if rate.value is None:
-                notes.append((facts.trial, f"k_tr: {rate.why or _NO_RELEASE}"))
-            last = run.force_f0[run.time_s >= run.time_s[-1] - 0.02 * (run.time_s[-1] - run.time_s[0])]
-            back = float(np.mean(last)) / before.value if rate.value is not None and before.value else None
+            restretched = restretch_end(run.trial.time_s, run.trial.length_change_l0)
+            if isinstance(restretched, Missing):
+                notes.append((facts.trial, f"k_tr: {rate.why or restretched.why}"))
+                back = Estimate(None)
+            else:
+                back = _redeveloped(run, restretched, before) if rate.value is not None else Estimate(None)
             rows.append(
                 {
                     "trial": facts.trial,
@@ -108,7 +108,7 @@ class RedevelopmentRates(Protocol):
             before = each.column("isometric_f0")
             for run, force in zip(each.runs, before, strict=True):
                 end_s = restretch_end(run.trial.time_s, run.trial.length_change_l0)
-                if end_s is not None and np.isfinite(force) and force > 0.0:
+                if not isinstance(end_s, Missing) and np.isfinite(force) and force > 0.0:
                     traces.plot(run.time_s - end_s, run.force_f0 / force, **look.trace)
             rates, errors = each.column("k_tr_per_s"), each.errors("k_tr_per_s")
             by_pca.errorbar(each.column("pca"), rates, errors, **look.points, elinewidth=0.8)
@@ -127,6 +127,16 @@ class RedevelopmentRates(Protocol):
     def size_mm(self, found: Sequence[Found]) -> tuple[float, float]:
         """Three axes beside each other."""
         return 190.0, 70.0
+
+
+def _redeveloped(run: Run, restretched_s: float, before: Estimate) -> Estimate:
+    """Force over that before, in the last of the isometric time that is followed."""
+    end_s = min(still_until(run.trial.time_s, run.trial.length_change_l0, restretched_s), float(run.time_s[-1]))
+    from_s = end_s - _LAST * (end_s - restretched_s)
+    first, last = np.searchsorted(run.time_s, [from_s - 5e-10, end_s + 5e-10]).tolist()
+    inside = slice(min(first, last - 1), last)  # one sample at least, where they are far apart
+    se = None if run.noise is None else run.noise.of_mean(run.time_s[inside])
+    return quotient(Estimate(float(np.mean(run.force_f0[inside])), se), before._replace(why=""))
 
 
 def _number(value: float, se: float) -> Number:

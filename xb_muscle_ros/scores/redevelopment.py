@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import curve_fit
+from scipy.optimize import OptimizeWarning, curve_fit
 
 from xb_muscle_ros.scores.estimate import Estimate, Missing
 from xb_muscle_ros.scores.standard_error import ForceNoise
@@ -29,7 +31,11 @@ _STILL_L0 = 0.01
 _SHORTEST_S = 0.2
 # Force that does not fall this far leaves nothing to redevelop.
 _SMALLEST_FALL = 0.1
-
+# A straight line fitted besides is told of where it changes k_tr by so many standard errors of the change, by one of
+# k_tr, and by this share of it.
+_DRIFTS, _MATTERS = 2.6, 0.01
+# A fit may try falls without end on its way.
+_LARGEST_EXPONENT = 100.0
 
 K_TR = "k_tr"
 
@@ -43,6 +49,7 @@ class Redevelopment(NamedTuple):
         start_f0, end_f0: force at the begin of the fit and where it tends to, F0.
         rmsd_f0: of the force from the curve, F0.
         from_s, to_s: what was fitted, in the clock of the samples, s.
+        told: how far a drift of force changes k_tr; empty where it does not, and where the noise is not known.
     """
 
     k_per_s: float
@@ -52,26 +59,38 @@ class Redevelopment(NamedTuple):
     rmsd_f0: float
     from_s: float
     to_s: float
+    told: str = ""
 
 
-def restretch_end(time_s: Array, length_l0: Array) -> float | None:
-    """Time (s) when a release by at least 5 % L0 that lasted 0.5 s at most was taken back; None where there is none.
+def restretch_end(time_s: Array, length_l0: Array) -> float | Missing:
+    """Time (s) when the one release by at least 5 % L0 that lasted 0.5 s at most was taken back.
 
     Args:
         time_s, length_l0: shape (n,), s and L0.
     """
+    none = Missing(
+        f"there is no release by {100.0 * SMALLEST_RELEASE_L0:g} % L0 or more that is taken back within "
+        f"{LONGEST_RELEASE_S:g} s"
+    )
     if length_l0.size < 3:
-        return None
+        return none
     shortest = int(np.argmin(length_l0))
     before = float(np.median(length_l0[:shortest])) if shortest else float(length_l0[0])
     step = before - float(length_l0[shortest])
     if step < SMALLEST_RELEASE_L0:
-        return None
+        return none
     away = np.flatnonzero(length_l0 < before - _BACK * step)
-    if away.size != away[-1] - away[0] + 1 or away[-1] + 1 >= length_l0.size:
-        return None  # more than one release, or none back
+    begins = away[np.flatnonzero(np.diff(away, prepend=-2) > 1)]
+    if begins.size > 1:
+        times = ", ".join(f"{time_s[k]:.4g}" for k in begins[:4]) + (" ..." if begins.size > 4 else "")
+        return Missing(
+            f"the fibre is released {begins.size} times, at {times} s; k_tr is that of one release: give each a trial "
+            "of its own"
+        )
+    if away[-1] + 1 >= length_l0.size:
+        return none
     end_s = float(time_s[away[-1] + 1])
-    return end_s if end_s - float(time_s[away[0]]) <= LONGEST_RELEASE_S else None
+    return end_s if end_s - float(time_s[away[0]]) <= LONGEST_RELEASE_S else none
 
 
 def still_until(time_s: Array, length_l0: Array, restretched_s: float) -> float:
@@ -90,19 +109,23 @@ def still_until(time_s: Array, length_l0: Array, restretched_s: float) -> float:
 
 
 def redevelopment_rate(trial: Trial, time_s: Array, force_f0: Array, noise: ForceNoise | None = None) -> Estimate:
-    """k_tr (1/s) of a trial's force; no value, of which nothing is said, where it is not released and restretched.
+    """k_tr (1/s) of a trial's force; no value, of which nothing is said, where it is not released and restretched once.
 
     Args:
         time_s, force_f0, noise: see `redevelopment`.
     """
     restretched = restretch_end(trial.time_s, trial.length_change_l0)
-    if restretched is None:
+    if isinstance(restretched, Missing):
         return Estimate(None)
     if np.ptp(trial.calcium_um) > 0.0:
         return Estimate(None, why="calcium changes, so that force does not redevelop alone")
     until = still_until(trial.time_s, trial.length_change_l0, restretched)
     found = redevelopment(time_s, force_f0, restretched, until, noise)
-    return Estimate(None, why=found.why) if isinstance(found, Missing) else Estimate(found.k_per_s, found.se_per_s)
+    if isinstance(found, Redevelopment):
+        return Estimate(found.k_per_s, found.se_per_s, found.told)
+    # The length of a short record ends before its force does; a movement is not its end.
+    again = f" (length moves again at {until:.4g} s)" if until < float(trial.time_s[-1]) - _SHORTEST_S else ""
+    return Estimate(None, why=f"{found.why}{again}")
 
 
 def redevelopment(
@@ -134,20 +157,14 @@ def redevelopment(
     since = t - t[0]
     half = float(since[int(np.argmax(force >= 0.5 * (force[0] + end)))])
     start = (np.log(2.0) / max(half, float(since[1])), float(force[0]), end)
-    try:
-        found, covariance = curve_fit(_rise, since, force, p0=start)
-    except RuntimeError:
+    fit = _fitted(_rise, since, force, start)
+    if fit is None:
         return Missing("no exponential could be fitted to the force after the restretch")
+    found, covariance = fit
     if not 0.0 < found[0] < _FASTEST_PER_S or not np.all(np.isfinite(covariance)):
         return Missing(f"the exponential that fits best has a rate of {found[0]:.3g} 1/s; allowed is 0 to 200")
     residual = force - _rise(since, *found)
-    # How the rate answers to the force at each sample.
-    weights = np.linalg.pinv(_slopes(since, *found))[0]
-    step_s = float(np.mean(np.diff(t)))
-    lines, rest = hum(step_s, residual)
-    se = ForceNoise(lambda lags_s: _autocovariance(rest, lags_s / step_s), step_s, lines).of_sum(weights, t)
-    if noise is not None:
-        se = max(se, noise.of_sum(weights, t) * _borne_out(noise, _slopes(since, *found), t, residual))
+    se = _error_of(t, residual, noise, _slopes(since, *found))
     return Redevelopment(
         k_per_s=float(found[0]),
         se_per_s=se,
@@ -156,7 +173,58 @@ def redevelopment(
         rmsd_f0=float(np.sqrt(np.mean(residual**2))),
         from_s=float(t[0]),
         to_s=float(t[-1]),
+        told="" if noise is None else _drift(t, force, tuple(found.tolist()), se, noise),
     )
+
+
+def _fitted(
+    curve: Callable[..., Array], since_s: Array, force: Array, start: tuple[float, ...]
+) -> tuple[Array, Array] | None:
+    """Parameters of a curve, and their covariance; None where none fits."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", OptimizeWarning)  # a covariance that is not finite tells the same
+        try:
+            found, covariance = curve_fit(curve, since_s, force, p0=start)
+        except RuntimeError:
+            return None
+    return found, covariance
+
+
+def _drift(t: Array, force: Array, alone: tuple[float, ...], se: float, noise: ForceNoise) -> str:
+    """How far k_tr changes where force drifts besides; empty where it surely does not."""
+    since = t - t[0]
+    fit = _fitted(_rise_and_drift, since, force, (*alone, 0.0))
+    if fit is None or not np.all(np.isfinite(fit[1])) or not 0.0 < fit[0][0] < _FASTEST_PER_S:
+        return ""
+    k, start, end, slope = fit[0].tolist()
+    slopes = np.column_stack([_slopes(since, k, start, end), since])
+    residual = force - _rise_and_drift(since, k, start, end, slope)
+    alone_too = np.column_stack([_slopes(since, *alone), np.zeros(since.size)])
+    change, least = k - alone[0], max(se, _MATTERS * alone[0])
+    if abs(change) < max(least, _DRIFTS * _error_of(t, residual, noise, slopes, alone_too)):
+        return ""
+    own = _error_of(t, residual, noise, slopes)
+    return (
+        f"force drifts by {slope:.2g} F0/s besides, or rises in two steps: with a straight line k_tr is {k:.3g} ± "
+        f"{own:.2g} 1/s, and {alone[0]:.3g} ± {se:.2g} without"
+    )
+
+
+def _error_of(t: Array, residual: Array, noise: ForceNoise | None, slopes: Array, less: Array | None = None) -> float:
+    """Standard error of the first parameter of a curve, 1/s; or of its difference from that of another one.
+
+    Args:
+        residual: what the curve leaves, F0.
+        noise: see `redevelopment`.
+        slopes: of the curve against its parameters, shape (n, parameters).
+        less: those of the other curve.
+    """
+    # How the rate answers to the force at each sample.
+    weights = np.linalg.pinv(slopes)[0] - (0.0 if less is None else np.linalg.pinv(less)[0])
+    step_s = float(np.mean(np.diff(t)))
+    lines, rest = hum(step_s, residual)
+    se = ForceNoise(lambda lags_s: _autocovariance(rest, lags_s / step_s), step_s, lines).of_sum(weights, t)
+    return se if noise is None else max(se, noise.of_sum(weights, t) * _borne_out(noise, slopes, t, residual))
 
 
 def _borne_out(noise: ForceNoise, slopes: Array, time_s: Array, residual: Array) -> float:
@@ -187,8 +255,12 @@ def _autocovariance(rest: Array, lags: Array) -> Array:
 
 
 def _rise(since_s: Array, k: float, start: float, end: float) -> Array:
-    curve: Array = end - (end - start) * np.exp(-k * since_s)
+    curve: Array = end - (end - start) * np.exp(np.minimum(-k * since_s, _LARGEST_EXPONENT))
     return curve
+
+
+def _rise_and_drift(since_s: Array, k: float, start: float, end: float, slope_per_s: float) -> Array:
+    return _rise(since_s, k, start, end) + slope_per_s * since_s
 
 
 def _slopes(since_s: Array, k: float, start: float, end: float) -> Array:
