@@ -145,6 +145,61 @@ def test_a_twitch_that_tells_nothing_is_a_note(trial: Trial, words: str) -> None
     assert all(row.get(key) is None or row[key].value is None for key in ("peak_f0", "to_peak_s", "fall_per_s"))
 
 
+@pytest.mark.parametrize("frequency", [1.0, 2.0, 5.0])
+def test_a_sharp_peak_in_a_long_record_is_read_at_its_top(frequency: float) -> None:
+    """Regression: every twelfth sample of a long train was looked at, and a peak of 2 ms was 5.3 % too low."""
+    (found,) = xb.run_protocol(
+        "tetanus", "13Dec2017a", model="hill_se", frequency=frequency, tell=lambda line: None
+    ).results
+    (run,) = found.runs
+    assert found.rows[0]["peak_f0"].value == pytest.approx(np.max(run.force_f0) - run.force_f0[0], rel=2e-3)
+
+
+def test_noise_flattens_no_sharp_peak() -> None:
+    """Regression: a parabola as wide as a third of the time to the peak lay under a peak that falls in 2 ms."""
+    made = xb.run_protocol("twitch", "13Dec2017a", model="hill_se", as_measured=True, tell=lambda line: None)
+    (true,), (trial,) = made.results[0].rows, made.trials
+    off = []
+    for seed in range(8):
+        noise = 2e-3 * np.random.default_rng(seed).standard_normal(trial.force_n.size)
+        (row,) = (
+            xb.analyse_protocol("twitch", [replace(trial, force_n=trial.force_n + noise)], tell=lambda line: None)
+            .results[0]
+            .rows
+        )
+        off.append((row["peak_f0"].value - true["peak_f0"].value) / row["peak_f0"].se)
+    assert np.sqrt(np.mean(np.square(off))) < 2.2
+
+
+@pytest.mark.parametrize(("until", "fall"), [(0.58, None), (0.59, None), (0.615, 7.36), (0.8, 7.36)])
+def test_the_steepest_fall_of_a_twitch_that_is_cut(until: float, fall: float | None) -> None:
+    """Force falls fastest at 0.6 s: with exp(-1)/50 ms. A record that ends before does not show it."""
+    told: list[str] = []
+    calcium = np.where(recorded(1000.0).time_s < 0.5, 0.1, 1.0)
+    trial = recorded(1000.0, until=until)
+    lit = replace(trial, calcium_time_s=trial.time_s, calcium_um=calcium[: trial.time_s.size])
+    (row,) = xb.analyse_protocol("twitch", [lit], tell=told.append).results[0].rows
+    assert row["fall_per_s"].value == (None if fall is None else pytest.approx(fall, rel=0.01))
+    assert (fall is None) == any("steepest fall" in line and "where the record ends" in line for line in told)
+
+
+def test_half_relaxation_beyond_a_noisy_record_is_none() -> None:
+    """Regression: one low sample before the record ends at 0.625 s counted; half of the peak is left at 0.634 s."""
+    found, calcium = [], np.where(recorded(1000.0).time_s < 0.5, 0.1, 1.0)
+    for seed in range(10):
+        trial = recorded(1000.0, until=0.625)
+        noise = 0.015 * np.random.default_rng(seed).standard_normal(trial.force_n.size)
+        lit = replace(trial, calcium_time_s=trial.time_s, calcium_um=calcium[: trial.time_s.size])
+        (row,) = (
+            xb.analyse_protocol("twitch", [replace(lit, force_n=trial.force_n + noise)], tell=lambda line: None)
+            .results[0]
+            .rows
+        )
+        half = row["half_relaxation_s"]
+        found.append(half.value is None or abs(half.value - 0.0839) < 3.0 * half.se)
+    assert all(found)
+
+
 def test_a_train_that_is_cut_has_no_fusion() -> None:
     made = xb.run_protocol("tetanus", "18Dec2017a", frequency=5.0, as_measured=True, tell=lambda line: None)
     (trial,) = made.trials

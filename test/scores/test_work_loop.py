@@ -45,7 +45,7 @@ def test_shortening_at_high_force_and_lengthening_at_low_is_positive_and_counter
     area = 0.5 * np.sum(length[:-1] * force[1:] - length[1:] * force[:-1])  # counter-clockwise is positive
     assert found.net.value == pytest.approx(area)
     assert found.net.value == pytest.approx(0.08)
-    assert found.peak_f0 == 1.0
+    assert found.peak_f0 == (1.0, None, "")
     assert found.net.se is None
 
 
@@ -74,9 +74,30 @@ def test_standard_errors_are_those_of_repeated_noise() -> None:
     assert np.all(ratio < 2.5)  # a little quiet time leaves slow noise possible
 
 
+def test_the_largest_force_is_not_that_of_the_noise() -> None:
+    """Regression: the largest of a thousand samples lies above force by three standard deviations of its noise."""
+    time = np.arange(3001) * 1e-3
+    length = np.where(time < 2.0, 0.0, 0.05 * np.sin(2.0 * np.pi * (time - 2.0)))
+    clean = 0.5 + np.where(time < 2.0, 0.0, 0.3 * np.sin(2.0 * np.pi * (time - 2.0)))
+    rng = np.random.default_rng(5)
+    phases = (xb.Phase("isometric", 0.0, 2.0), xb.Phase("cycles", 2.0, 3.0))
+    trial = Trial(xb.TrialFacts("made", "loop", phases=phases), time, 1.0 + length, np.zeros(1), np.ones(1))
+    off, told = [], []
+    for _ in range(20):
+        force = clean + 0.02 * rng.standard_normal(time.size)
+        held = replace(trial, force_time_s=time, force_n=np.where(time < 2.0, force, clean))
+        peak = work_of(time, length, force, 2.0, 3.0, force_noise(held)).peak_f0
+        assert peak.value is not None
+        assert peak.se is not None
+        off.append(peak.value - 0.8)
+        told.append(peak.se)
+    assert abs(np.mean(off)) < 0.006
+    assert 0.5 < np.mean(told) / np.std(off) < 3.0
+
+
 @pytest.mark.parametrize(
     ("nets", "cycle"), [([1.0, 1.0, 1.0], 1), ([2.0, 1.001, 1.0], 2), ([3.0, 2.0, 1.0], None), ([1.0, 2.0, 1.0], None)]
 )
 def test_the_cycle_from_which_loops_repeat(nets: list[float], cycle: int | None) -> None:
-    works = [Work(Estimate(net), Estimate(net + 0.5), Estimate(-0.5), 1.0, 0.5, 0.1, 0.0) for net in nets]
+    works = [Work(Estimate(net), Estimate(net + 0.5), Estimate(-0.5), Estimate(1.0), 0.5, 0.1, 0.0) for net in nets]
     assert repeats_from(works, 0.01) == cycle

@@ -5,7 +5,8 @@ A single sample has all of its noise, and the difference of two all the more: th
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -13,9 +14,14 @@ from xb_muscle_ros.scores.estimate import Estimate
 from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.trial import Array
 
-_FEWEST = 5
-# Times at which the extreme of a stretch of time is looked for, and steps from there to the vertex.
-_TRIED, _STEPS = 400, 4
+FEWEST = 5
+# Parts in which the extreme of a stretch of time is looked for first, and steps from there to the vertex.
+_PARTS, _STEPS = 400, 4
+# Parabolas are as wide as noise asks for: until standard errors are this share of the number.
+_SURE = 0.01
+_WIDTHS = (0.0, 0.125, 0.25, 0.5, 1.0)
+
+_Estimates = TypeVar("_Estimates", bound=tuple[Estimate, ...])
 
 
 class Local(NamedTuple):
@@ -47,7 +53,7 @@ def local(time_s: Array, force_f0: Array, at_s: float, width_s: float) -> Local:
         time_s, force_f0: shape (n,), increasing, s and F0; n is 5 at least.
     """
     first, last = np.searchsorted(time_s, [at_s - 0.5 * width_s - 5e-10, at_s + 0.5 * width_s + 5e-10])
-    while last - first < _FEWEST:
+    while last - first < FEWEST:
         # The nearer one is taken next.
         left = at_s - time_s[first - 1] if first > 0 else np.inf
         right = time_s[last] - at_s if last < time_s.size else np.inf
@@ -76,8 +82,7 @@ def extreme(
     noise: ForceNoise | None,
 ) -> Extreme:
     """The largest (sign 1) or smallest (sign -1) value of parabolas between two times."""
-    tried = [local(time_s, force_f0, at, width_s) for at in _times(time_s, between_s)]
-    best = max(tried, key=lambda each: sign * each.value)
+    best = _best(time_s, force_f0, between_s, width_s, sign * force_f0, lambda each: sign * each.value)
     for _ in range(_STEPS):
         # To the vertex, where it is within reach; else the extreme is at an end.
         away = -best.slope / best.curvature if sign * best.curvature < 0.0 else np.inf
@@ -99,15 +104,67 @@ def steepest(
     width_s: float,
     sign: float,
     noise: ForceNoise | None,
-) -> Estimate:
+) -> Extreme:
     """The largest (sign 1) or smallest (sign -1) slope of parabolas between two times, F0/s."""
-    tried = [local(time_s, force_f0, at, width_s) for at in _times(time_s, between_s)]
-    best = max(tried, key=lambda each: sign * each.slope)
-    return Estimate(best.slope, best.error(np.array([0.0, 1.0, 0.0]), noise))
+    slopes = sign * np.gradient(force_f0, time_s)
+    best = _best(time_s, force_f0, between_s, width_s, slopes, lambda each: sign * each.slope)
+    return Extreme(Estimate(best.slope, best.error(np.array([0.0, 1.0, 0.0]), noise)), Estimate(best.at_s))
 
 
-def _times(time_s: Array, between_s: tuple[float, float]) -> Array:
-    """Times of samples between two times, ends included; of many some."""
-    inside = time_s[(time_s > between_s[0]) & (time_s < between_s[1])]
-    every = max(inside.size // _TRIED, 1)
-    return np.concatenate([[between_s[0]], inside[every // 2 :: every], [between_s[1]]])
+def widths(most_s: float) -> Iterator[float]:
+    """Widths of parabolas that are tried, from that of five samples up to the widest, s."""
+    return (share * most_s for share in _WIDTHS)
+
+
+def is_sure(found: Estimate, least: float = 0.0, share: float = _SURE) -> bool:
+    """Whether a number's standard error is so small that its parabola need not be wider.
+
+    Args:
+        least: the error of a smaller number may be that of this one.
+        share: of the number that the error may be.
+    """
+    return found.value is not None and (found.se or 0.0) <= share * max(abs(found.value), least)
+
+
+def narrowest(
+    make: Callable[[float], _Estimates], most_s: float, least: float = 0.0, sure: float = _SURE
+) -> _Estimates:
+    """Of estimates by parabolas, those by the narrowest that are sure; else those by the widest.
+
+    Args:
+        make: estimates by parabolas of a width, s.
+        most_s: the widest, s.
+        least, sure: see `is_sure`.
+    """
+    for width_s in widths(most_s):
+        found = make(width_s)
+        if all(is_sure(each, least, sure) for each in found):
+            break
+    return found
+
+
+def _best(
+    time_s: Array,
+    force_f0: Array,
+    between_s: tuple[float, float],
+    width_s: float,
+    promise: Array,
+    how_far: Callable[[Local], float],
+) -> Local:
+    """The parabola that goes furthest between two times: of long stretches first one of each part, then all nearby.
+
+    Args:
+        promise: of each sample, by which the one of its part is chosen, shape (n,).
+    """
+
+    def furthest(times: Array) -> Local:
+        return max((local(time_s, force_f0, at, width_s) for at in times.tolist()), key=how_far)
+
+    inside = np.flatnonzero((time_s > between_s[0]) & (time_s < between_s[1]))
+    every = max(inside.size // _PARTS, 1)
+    chosen = [inside[k : k + every][np.argmax(promise[inside[k : k + every]])] for k in range(0, inside.size, every)]
+    best = furthest(np.concatenate([[between_s[0]], time_s[chosen], [between_s[1]]]))
+    if every == 1:
+        return best
+    around = int(np.searchsorted(time_s[inside], best.at_s))
+    return furthest(np.append(time_s[inside[max(around - every, 0) : around + every + 1]], best.at_s))

@@ -2,32 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
 from xb_muscle_ros.scores.estimate import Estimate, Missing, quotient, rounded
-from xb_muscle_ros.scores.local import Extreme, extreme, local, steepest
+from xb_muscle_ros.scores.local import FEWEST, Extreme, extreme, is_sure, local, narrowest, steepest, widths
 from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.trial import Array
 
 # Force that rises by less than this over that before the pulse is no contraction, F0.
 SMALLEST_F0 = 1e-4
-_FEWEST = 5
-# Parabolas through a measured force are as wide as noise asks for: until standard errors are this share of the number,
-# and at most shares of the time to the peak for the peak and for the rise, of half relaxation for the fall, and of the
-# time between two pulses, where it is at most so many s.
-_SURE = 0.01
-_NARROWER = (0.0, 0.125, 0.25, 0.5, 1.0)
-_PEAK, _RISE, _FALL = 0.35, 0.1, 0.2
+# Parabolas through a measured force are at most as wide as shares of the time to the peak for the peak and for the
+# rise, of half relaxation for the fall and for a peak that is sharp, and of the time between two pulses, where it is at
+# most so many s.
+_PEAK, _RISE, _FALL, _SHARP = 0.35, 0.1, 0.2, 0.5
 _RIPPLE, _RIPPLE_S = 0.05, 0.01
 _STEPS = 5
 # Five samples tell what lasts twice as long as they do.
 _COARSE = 0.5
-
-
-_Estimates = TypeVar("_Estimates", bound=tuple[Estimate, ...])
+_NOT_HALF = "force does not fall to half of its peak within the record"
 
 
 class Twitch(NamedTuple):
@@ -39,7 +33,8 @@ class Twitch(NamedTuple):
         to_peak_s: from the pulse to the peak, s.
         half_relaxation_s: from the peak until half of the rise is lost, s; without a value where it is not within the
             record.
-        rise_per_s, fall_per_s: steepest rise and fall over the peak, 1/s.
+        rise_per_s, fall_per_s: steepest rise and fall over the peak, 1/s; no fall where force still falls faster where
+            the record ends.
     """
 
     rest_f0: Estimate
@@ -74,8 +69,8 @@ def twitch(time_s: Array, force_f0: Array, pulse_s: float, noise: ForceNoise | N
         nothing where there are too few samples, or force hardly rises.
     """
     after = time_s >= pulse_s - 5e-10
-    if np.count_nonzero(after) < _FEWEST:
-        return Missing(f"there are fewer than {_FEWEST} samples after the pulse at {pulse_s:g} s")
+    if np.count_nonzero(after) < FEWEST:
+        return Missing(f"there are fewer than {FEWEST} samples after the pulse at {pulse_s:g} s")
     rest = level_before(time_s, force_f0, pulse_s, noise)
     assert rest.value is not None
     t, force = time_s[after] - pulse_s, force_f0[after] - rest.value
@@ -89,20 +84,22 @@ def twitch(time_s: Array, force_f0: Array, pulse_s: float, noise: ForceNoise | N
         return Missing(f"five samples last {1e3 * five_s:.3g} ms, more than half of the time to the peak")
     if top >= t.size - 2:
         return _unended(rest, t)
+    widest_s = min(_PEAK * float(t[top]), _SHARP * _until_half(t, force, top))
     reach_s = max(_PEAK * float(t[top]), 2.0 * float(np.max(np.diff(t))))
     around = max(0.0, t[top] - reach_s), min(float(t[-1]), t[top] + reach_s)
-    found = _peak(t, force, around, _PEAK * float(t[top]), noise)
+    found = _peak(t, force, around, widest_s, noise)
     peak, to_peak = found.value.value, found.at_s.value
     assert peak is not None
     assert to_peak is not None
     if to_peak >= float(t[-1]) - 0.5 * five_s:
         return _unended(rest, t)
-    rise = _narrowest(lambda width_s: (steepest(t, force, (0.0, to_peak), width_s, 1.0, noise),), _RISE * to_peak)[0]
+    rise = narrowest(lambda width_s: (steepest(t, force, (0.0, to_peak), width_s, 1.0, noise).value,), _RISE * to_peak)[
+        0
+    ]
     half = _half_relaxation(t, force, found, noise)
     if five_s > _COARSE * (half.value or np.inf):
         half = Estimate(None, why=f"five samples last {1e3 * five_s:.3g} ms, more than half of it")
-    after_peak, most_s = (to_peak, float(t[-1])), _FALL * (half.value or float(t[-1]) - to_peak)
-    fall = _narrowest(lambda width_s: (steepest(t, force, after_peak, width_s, -1.0, noise),), most_s)[0]
+    fall = _steepest_fall(t, force, to_peak, _FALL * (half.value or float(t[-1]) - to_peak), noise)
     over = Estimate(peak, found.value.se)
     return Twitch(
         rest,
@@ -110,8 +107,31 @@ def twitch(time_s: Array, force_f0: Array, pulse_s: float, noise: ForceNoise | N
         found.at_s,
         half,
         quotient(rise, over),
-        quotient(Estimate(-(fall.value or 0.0), fall.se), over),
+        quotient(fall, over),
     )
+
+
+def _until_half(t: Array, force: Array, top: int) -> float:
+    """Time from the largest sample to the first that is at half of it, s; infinite where there is none."""
+    fallen = np.flatnonzero(force[top:] <= 0.5 * force[top])
+    return float(t[top + fallen[0]] - t[top]) if fallen.size else np.inf
+
+
+def _steepest_fall(t: Array, force: Array, to_peak_s: float, most_s: float, noise: ForceNoise | None) -> Estimate:
+    """The steepest fall after the peak, F0/s, positive; none where force falls ever faster until the record ends."""
+    last_s = float(t[-1])
+
+    def seen(width_s: float) -> tuple[Estimate]:
+        found = steepest(t, force, (to_peak_s, last_s), width_s, -1.0, noise)
+        at_s = found.at_s.value
+        # Beyond this a parabola has samples on one side alone.
+        if at_s is None or at_s > last_s - max(0.5 * width_s, 0.5 * FEWEST * float(t[-1] - t[-2])):
+            why = f"force falls fastest where the record ends, {1e3 * (last_s - to_peak_s):.3g} ms after the peak"
+            return (Estimate(None, why=why),)
+        return (found.value,)
+
+    found = narrowest(seen, most_s)[0]
+    return found if found.value is None else Estimate(-found.value, found.se)
 
 
 def _unended(rest: Estimate, t: Array) -> Twitch:
@@ -127,15 +147,6 @@ def level_before(time_s: Array, force_f0: Array, pulse_s: float, noise: ForceNoi
     return Estimate(float(np.mean(force_f0[inside])), None if noise is None else noise.of_mean(time_s[inside]))
 
 
-def _narrowest(make: Callable[[float], _Estimates], most_s: float, least: float = 0.0) -> _Estimates:
-    """Of estimates by parabolas, those by the narrowest that are sure; else those by the widest."""
-    for share in _NARROWER:
-        found = make(share * most_s)
-        if all(each.value is not None and (each.se or 0.0) <= _SURE * max(abs(each.value), least) for each in found):
-            break
-    return found
-
-
 def _peak(t: Array, force: Array, around: tuple[float, float], most_s: float, noise: ForceNoise | None) -> Extreme:
     """The peak by the narrowest parabolas by which height and time are sure; the widest tells how it is curved."""
     widest = extreme(t, force, around, most_s, 1.0, noise)
@@ -143,12 +154,12 @@ def _peak(t: Array, force: Array, around: tuple[float, float], most_s: float, no
     assert height is not None
     assert at_s is not None
     curvature = abs(local(t, force, at_s, most_s).curvature)
-    for share in _NARROWER[:-1]:
-        here = local(t, force, at_s, share * most_s)
-        of_value = here.error(np.array([1.0, 0.0, 0.0]), noise) or 0.0
-        of_slope = here.error(np.array([0.0, 1.0, 0.0]), noise) or 0.0
-        if of_value <= _SURE * height and of_slope <= _SURE * curvature * at_s:
-            return extreme(t, force, around, share * most_s, 1.0, noise)
+    for width_s in widths(most_s):
+        here = local(t, force, at_s, width_s)
+        of_value = Estimate(height, here.error(np.array([1.0, 0.0, 0.0]), noise))
+        of_slope = Estimate(curvature * at_s, here.error(np.array([0.0, 1.0, 0.0]), noise))
+        if is_sure(of_value) and is_sure(of_slope):
+            return extreme(t, force, around, width_s, 1.0, noise)
     return widest
 
 
@@ -160,7 +171,7 @@ def _half_relaxation(t: Array, force: Array, top: Extreme, noise: ForceNoise | N
     late = t > to_peak_s
     fallen = np.flatnonzero(force[late] <= 0.5 * peak)
     if not fallen.size:
-        return Estimate(None, why="force does not fall to half of its peak within the record")
+        return Estimate(None, why=_NOT_HALF)
     first_s = float(t[late][fallen[0]])
 
     def crossing(width_s: float) -> tuple[Estimate]:
@@ -170,14 +181,17 @@ def _half_relaxation(t: Array, force: Array, top: Extreme, noise: ForceNoise | N
             here = local(t, force, at_s, width_s)
             if here.slope >= 0.0:
                 return (Estimate(None, why="force does not fall through half of its peak"),)
-            at_s = float(np.clip(at_s + (0.5 * peak - here.value) / here.slope, to_peak_s, t[-1]))
+            next_s = at_s + (0.5 * peak - here.value) / here.slope
+            at_s = float(np.clip(next_s, to_peak_s, t[-1]))
+        if next_s > t[-1] + 5e-10:  # a sample is so low by its noise alone
+            return (Estimate(None, why=_NOT_HALF),)
         se = here.error(np.array([1.0, 0.0, 0.0]) / here.slope, noise)
         if se is not None:
             others = 0.5 * (top.value.se or 0.0) / here.slope, top.at_s.se or 0.0
             se = rounded(float(np.linalg.norm([se, *others])))
         return (Estimate(at_s - to_peak_s, se),)
 
-    return _narrowest(crossing, _FALL * (first_s - to_peak_s))[0]
+    return narrowest(crossing, _FALL * (first_s - to_peak_s))[0]
 
 
 def ripple(
@@ -199,8 +213,8 @@ def ripple(
     # Each response peaks later than its pulse, a fused one perhaps after the next pulse would have come.
     between = (time_s >= begin_s) & (time_s < end_s)
     last = (time_s >= end_s) & (time_s < end_s + 2.0 * interval_s)
-    if np.count_nonzero(between) < _FEWEST or np.count_nonzero(last) < _FEWEST:
-        return Missing(f"there are fewer than {_FEWEST} samples between two pulses")
+    if np.count_nonzero(between) < FEWEST or np.count_nonzero(last) < FEWEST:
+        return Missing(f"there are fewer than {FEWEST} samples between two pulses")
     force, last_s = force_f0 - rest_f0, float(time_s[last][-1])
     if int(np.argmax(force[last])) >= np.count_nonzero(last) - 1 and last_s >= float(time_s[-1]):
         return Missing("force still rises where the record ends")
@@ -218,5 +232,6 @@ def ripple(
         lowest = extreme(time_s, force, (before, top_s), width_s, -1.0, noise).value
         return Ripple(found.value, quotient(lowest, found.value))
 
+    sharp_s = _SHARP * _until_half(time_s, force, int(np.flatnonzero(last)[np.argmax(force[last])]))
     # Force may fall to rest between two pulses.
-    return _narrowest(seen, min(_RIPPLE * interval_s, _RIPPLE_S), 0.1)
+    return narrowest(seen, min(_RIPPLE * interval_s, _RIPPLE_S, sharp_s), 0.1)

@@ -14,8 +14,14 @@ import numpy as np
 import numpy.typing as npt
 
 from xb_muscle_ros.scores.estimate import Estimate
+from xb_muscle_ros.scores.local import FEWEST, extreme, narrowest
 from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.trial import Array
+
+# The parabola that reads the largest force of a cycle is at most as wide as this share of it.
+_PEAK = 0.1
+# ... and so wide until its standard error is this share of the force: the largest of several is too large by about one.
+_SURE = 0.0025
 
 
 class Work(NamedTuple):
@@ -24,7 +30,8 @@ class Work(NamedTuple):
     Attributes:
         net: F0·L0; positive: done by the muscle.
         shortening, lengthening: their parts while length falls (as a rule positive) and rises (as a rule negative).
-        peak_f0, mean_f0: largest force, and mean over time, F0.
+        peak_f0: largest force, F0: of a noisy one that of parabolas as wide as its noise asks for.
+        mean_f0: mean over time, F0.
         excursion_l0: longest less shortest length, L0.
         left_l0: length at the end less that at the begin, L0: 0 where the loop is closed.
     """
@@ -32,7 +39,7 @@ class Work(NamedTuple):
     net: Estimate
     shortening: Estimate
     lengthening: Estimate
-    peak_f0: float
+    peak_f0: Estimate
     mean_f0: float
     excursion_l0: float
     left_l0: float
@@ -70,8 +77,23 @@ def work_of(
     values = weights.T @ force
     errors = [None] * 3 if noise is None else [noise.of_sum(weight, time) for weight in weights.T]
     made = [Estimate(float(value), error) for value, error in zip(values, errors, strict=True)]
+    peak = Estimate(float(met.max())) if noise is None else _peak(time_s, force_f0, (begin_s, end_s), noise)
     mean = float(np.sum(np.diff(at_s) * 0.5 * (met[:-1] + met[1:])) / (end_s - begin_s))
-    return Work(made[0], made[1], made[2], float(met.max()), mean, float(np.ptp(at)), float(at[-1] - at[0]))
+    return Work(made[0], made[1], made[2], peak, mean, float(np.ptp(at)), float(at[-1] - at[0]))
+
+
+def _peak(time_s: Array, force_f0: Array, between_s: tuple[float, float], noise: ForceNoise) -> Estimate:
+    """The largest force of a cycle without what noise adds to the largest of many samples, F0."""
+    if time_s.size < FEWEST:
+        return Estimate(None, why=f"a parabola through its force needs {FEWEST} samples")
+    widest_s = _PEAK * (between_s[1] - between_s[0])
+    widest = extreme(time_s, force_f0, between_s, widest_s, 1.0, noise)
+    # Where the widest has its top: the largest of many narrow ones is that of the noise again.
+    top_s = widest.at_s.value or 0.0
+    near_s = max(between_s[0], top_s - 0.25 * widest_s), min(between_s[1], top_s + 0.25 * widest_s)
+    return narrowest(
+        lambda width_s: (extreme(time_s, force_f0, near_s, width_s, 1.0, noise).value,), widest_s, sure=_SURE
+    )[0]
 
 
 def _falling(length_l0: Array) -> npt.NDArray[np.bool_]:
