@@ -13,10 +13,12 @@ from xb_muscle_ros.protocols.registry import PROTOCOLS
 from xb_muscle_ros.trials.trial import Trial
 
 
-def maxwell(amplitude: float, speed: float) -> Trial:
+def maxwell(amplitude: float, speed: float, lead_s: float = 0.1) -> Trial:
     """A spring of 2 F0/L0 beside a spring of 30 F0/L0 with a dashpot that relaxes in 50 ms, on a force of 0.5 F0."""
     protocol = PROTOCOLS["ramp-hold"]
-    (planned,) = protocol.plan("made", settings_of(protocol, {"pca": 6.1, "amplitude": amplitude, "speed": speed}))
+    (planned,) = protocol.plan(
+        "made", settings_of(protocol, {"pca": 6.1, "amplitude": amplitude, "speed": speed, "lead": lead_s})
+    )
     trial = planned.trial
     ramp = trial.facts.phases[1]
     tau, v = 0.05, np.sign(amplitude) * speed
@@ -36,9 +38,45 @@ def test_closed_form(amplitude: float, speed: float) -> None:
     assert row["end_f0"].value == pytest.approx(0.5 + change, abs=0.01 * abs(change))
     assert row["held_f0"].value == pytest.approx(0.5 + 2.0 * amplitude, abs=1e-6)
     assert row["relaxed"] == pytest.approx((change - 2.0 * amplitude) / change, rel=0.01)
-    assert row["half_s"] == pytest.approx(tau * np.log(2.0), abs=2e-3)
+    assert row["half_s"].value == pytest.approx(tau * np.log(2.0), abs=2e-3)
     # Over the first 10 ms the dashpot gives a tenth: mean slope of the exponential there.
     assert row["srs_f0_per_l0"].value == pytest.approx(2.0 + 30.0 * np.exp(-0.1), rel=0.02)
+
+
+def test_half_time_of_a_noisy_force_has_its_error() -> None:
+    """Regression: the first sample that noise takes to half of the loss counted, 10 ms and more too early."""
+    clean = maxwell(0.05, 0.5, lead_s=1.0)
+    (true,) = xb.analyse_protocol("ramp-hold", [clean], tell=lambda line: None).results[0].rows
+    off, errors = [], []
+    for seed in range(12):
+        noise = 0.03 * np.random.default_rng(seed).standard_normal(clean.force_n.size)
+        noisy = replace(clean, force_n=clean.force_n + noise)
+        (row,) = xb.analyse_protocol("ramp-hold", [noisy], tell=lambda line: None).results[0].rows
+        assert row["half_s"].se is not None
+        off.append(row["half_s"].value - true["half_s"].value)
+        errors.append(row["half_s"].se)
+    assert abs(np.mean(off)) < 2e-3
+    assert 0.4 < np.mean(errors) / np.sqrt(np.mean(np.square(off))) < 3.0
+
+
+def test_half_time_of_a_model_is_not_that_of_a_sample() -> None:
+    """Regression: at 200 samples per second half times were multiples of 5 ms."""
+    halves = []
+    for rate in (200.0, 5000.0):
+        (found,) = xb.run_protocol(
+            "ramp-hold", "18Dec2017a", pca=4.5, amplitude=0.04, speed=0.8, rate=rate, tell=lambda line: None
+        ).results
+        halves.append(found.rows[0]["half_s"].value)
+    assert halves[0] == pytest.approx(halves[1], abs=1.5e-3)
+
+
+def test_a_hold_that_loses_little_has_no_half_time() -> None:
+    trial = maxwell(0.05, 0.5)
+    spring = replace(trial, force_n=0.5 + 2.0 * trial.length_change_l0)
+    told: list[str] = []
+    (found,) = xb.analyse_protocol("ramp-hold", [spring], tell=told.append).results
+    assert found.rows[0]["half_s"].value is None
+    assert any("time to half of that, of trial" in line and "the hold loses" in line for line in told)
 
 
 def test_a_trial_of_several_ramps_is_a_note() -> None:

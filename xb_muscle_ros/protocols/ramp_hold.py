@@ -13,6 +13,7 @@ from xb_muscle_ros.protocols.base import Cell, Column, Found, Option, Planned, P
 from xb_muscle_ros.protocols.figures import legend, lettered, looks
 from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
 from xb_muscle_ros.scores.estimate import Estimate, notes_of
+from xb_muscle_ros.scores.local import crossing
 from xb_muscle_ros.scores.readout import isometric_force
 from xb_muscle_ros.scores.stiffness import stiffness_of_phase
 from xb_muscle_ros.trials.protocol import ALLOWED, SPEED_L0_PER_S, Allowed
@@ -22,6 +23,9 @@ from xb_muscle_ros.trials.trial import Phase
 _MEAN_S, _SHARE = 0.002, 0.1
 # A hold that loses less of the ramp's change than this has no half time.
 _LOST = 0.05
+# ... nor one that loses less than so many of its standard errors. Parabolas that read half times are at most so wide.
+_UNSURE, _WIDE = 3.0, 0.5
+_NO_HALF = "force does not come to half of what the hold loses"
 # A change of force below this has no share to lose, F0.
 _LEAST_F0 = 1e-4
 _MOVING = ("stretch", "shortening", "release", "test_stretch")
@@ -142,12 +146,33 @@ def _row(run: Run) -> tuple[Mapping[str, Cell], list[str]]:
     if abs(change) < max(_LEAST_F0, 3.0 * (at_end.se or 0.0)):
         return row, [*whys, f"share lost: the ramp changes force by {change:.2g} F0 alone"]
     row["relaxed"] = (at_end.value - held.value) / change
-    after = run.time_s >= phase.end_s
-    since, force = run.time_s[after] - phase.end_s, run.force_f0[after]
-    past = np.flatnonzero((force - 0.5 * (at_end.value + held.value)) * np.sign(at_end.value - held.value) <= 0.0)
-    if past.size and abs(at_end.value - held.value) > _LOST * abs(change):
-        row["half_s"] = float(since[past[0]])
+    row["half_s"] = _half(run, phase.end_s, at_end, held, abs(change))
     return row, whys
+
+
+def _half(run: Run, from_s: float, at_end: Estimate, held: Estimate, change_f0: float) -> Estimate:
+    """Time from the end of the ramp until half of what the hold loses is lost, s."""
+    assert at_end.value is not None
+    assert held.value is not None
+    lost = at_end.value - held.value
+    se = float(np.hypot(at_end.se or 0.0, held.se or 0.0))
+    if abs(lost) <= max(_LOST * change_f0, _UNSURE * se):
+        error = f" ± {se:.2g} (SE)" if se else ""
+        return Estimate(None, why=f"the hold loses {abs(lost):.2g}{error} F0 alone, of a change of {change_f0:.2g} F0")
+    # Of a force that rises in the hold its negative falls.
+    sign, level = np.sign(lost), 0.5 * (at_end.value + held.value)
+    if run.noise is None:
+        below = np.flatnonzero((run.time_s >= from_s) & (sign * (run.force_f0 - level) <= 0.0))
+        k = int(below[0]) if below.size else 0
+        if k == 0:
+            return Estimate(None, why=_NO_HALF)
+        before, at = (float(each) for each in sign * (run.force_f0[k - 1 : k + 1] - level))
+        share = before / (before - at) if before > 0.0 else 1.0
+        crossed_s = float(run.time_s[k - 1] + share * (run.time_s[k] - run.time_s[k - 1]))
+        return Estimate(max(crossed_s - from_s, 0.0))
+    half = Estimate(sign * level, 0.5 * se)
+    found = crossing(run.time_s, sign * run.force_f0, half, from_s, _WIDE, run.noise)
+    return Estimate(None, why=_NO_HALF) if found.value is None else Estimate(found.value - from_s, found.se)
 
 
 def _mean(run: Run, from_s: float, to_s: float) -> Estimate:

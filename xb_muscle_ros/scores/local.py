@@ -10,13 +10,16 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from xb_muscle_ros.scores.estimate import Estimate
+from xb_muscle_ros.scores.estimate import Estimate, rounded
 from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.trial import Array
 
 FEWEST = 5
 # Parts in which the extreme of a stretch of time is looked for first, and steps from there to the vertex.
 _PARTS, _STEPS = 400, 4
+# Steps from there to where a parabola crosses a level. What lies above it by so many standard errors of a mean is not
+# taken for below; such means there are so many of at least.
+_CROSSING_STEPS, _CERTAIN, _FEWEST_MEANS = 5, 4.0, 10
 # Parabolas are as wide as noise asks for: until standard errors are this share of the number.
 _SURE = 0.01
 _WIDTHS = (0.0, 0.125, 0.25, 0.5, 1.0)
@@ -109,6 +112,59 @@ def steepest(
     slopes = sign * np.gradient(force_f0, time_s)
     best = _best(time_s, force_f0, between_s, width_s, slopes, lambda each: sign * each.slope)
     return Extreme(Estimate(best.slope, best.error(np.array([0.0, 1.0, 0.0]), noise)), Estimate(best.at_s))
+
+
+def crossing(
+    time_s: Array, force_f0: Array, level: Estimate, from_s: float, share: float, noise: ForceNoise | None
+) -> Estimate:
+    """When force that lies above a level first falls through it, by parabolas, s; without a value where it does not.
+
+    Args:
+        level: F0, and its standard error.
+        from_s: force is looked at from there on, s.
+        share: of the time from there until the crossing that a parabola may be wide.
+    """
+    late = time_s > from_s
+    if level.value is None or np.count_nonzero(late) < FEWEST:
+        return Estimate(None)
+    t, force, at_level = time_s[late], force_f0[late], level.value
+    first = _first_below(t, force, at_level, noise)
+    if first is None:
+        return Estimate(None)
+
+    def through(width_s: float) -> tuple[Estimate]:
+        # From a first guess, the parabola's own crossing is a few steps away.
+        at_s = next_s = first
+        for _ in range(_CROSSING_STEPS):
+            here = local(time_s, force_f0, at_s, width_s)
+            if here.slope >= 0.0:
+                return (Estimate(None),)
+            next_s = at_s + (at_level - here.value) / here.slope
+            at_s = float(np.clip(next_s, from_s, t[-1]))
+        if next_s > t[-1] + 5e-10:  # samples are so low by their noise alone
+            return (Estimate(None),)
+        se = here.error(np.array([1.0, 0.0, 0.0]) / here.slope, noise)
+        return (Estimate(at_s, None if se is None else rounded(float(np.hypot(se, (level.se or 0.0) / here.slope)))),)
+
+    # What has to be sure is the time from there on.
+    def since(width_s: float) -> tuple[Estimate]:
+        (found,) = through(width_s)
+        return (found if found.value is None else found._replace(value=found.value - from_s),)
+
+    (found,) = narrowest(since, share * max(first - from_s, 0.0))
+    return found if found.value is None else found._replace(value=found.value + from_s)
+
+
+def _first_below(t: Array, force: Array, level: float, noise: ForceNoise | None) -> float | None:
+    """When force first falls below a level, s: of a noisy force the mean of so many samples as noise asks for."""
+    count = 1
+    if noise is not None:
+        above = float(np.max(force[:FEWEST])) - level
+        while 2 * count < t.size // _FEWEST_MEANS and _CERTAIN * noise.of_mean(t[:count]) > above:
+            count *= 2
+    means = np.convolve(force, np.full(count, 1.0 / count), "valid")
+    below = np.flatnonzero(means <= level)
+    return float(np.mean(t[below[0] : below[0] + count])) if below.size else None
 
 
 def widths(most_s: float) -> Iterator[float]:

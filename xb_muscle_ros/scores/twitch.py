@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from xb_muscle_ros.scores.estimate import Estimate, Missing, quotient, rounded
-from xb_muscle_ros.scores.local import FEWEST, Extreme, extreme, is_sure, local, narrowest, steepest, widths
+from xb_muscle_ros.scores.local import FEWEST, Extreme, crossing, extreme, is_sure, local, narrowest, steepest, widths
 from xb_muscle_ros.scores.standard_error import ForceNoise
 from xb_muscle_ros.trials.trial import Array
 
@@ -18,7 +18,6 @@ SMALLEST_F0 = 1e-4
 # most so many s.
 _PEAK, _RISE, _FALL, _SHARP = 0.35, 0.1, 0.2, 0.5
 _RIPPLE, _RIPPLE_S = 0.05, 0.01
-_STEPS = 5
 # Five samples tell what lasts twice as long as they do.
 _COARSE = 0.5
 _NOT_HALF = "force does not fall to half of its peak within the record"
@@ -168,30 +167,12 @@ def _half_relaxation(t: Array, force: Array, top: Extreme, noise: ForceNoise | N
     peak, to_peak_s = top.value.value, top.at_s.value
     assert peak is not None
     assert to_peak_s is not None
-    late = t > to_peak_s
-    fallen = np.flatnonzero(force[late] <= 0.5 * peak)
-    if not fallen.size:
+    level = Estimate(0.5 * peak, None if noise is None else 0.5 * (top.value.se or 0.0))
+    found = crossing(t, force, level, to_peak_s, _FALL, noise)
+    if found.value is None:
         return Estimate(None, why=_NOT_HALF)
-    first_s = float(t[late][fallen[0]])
-
-    def crossing(width_s: float) -> tuple[Estimate]:
-        # From the first sample that is so low, the parabola's own crossing is a few steps away.
-        at_s = first_s
-        for _ in range(_STEPS):
-            here = local(t, force, at_s, width_s)
-            if here.slope >= 0.0:
-                return (Estimate(None, why="force does not fall through half of its peak"),)
-            next_s = at_s + (0.5 * peak - here.value) / here.slope
-            at_s = float(np.clip(next_s, to_peak_s, t[-1]))
-        if next_s > t[-1] + 5e-10:  # a sample is so low by its noise alone
-            return (Estimate(None, why=_NOT_HALF),)
-        se = here.error(np.array([1.0, 0.0, 0.0]) / here.slope, noise)
-        if se is not None:
-            others = 0.5 * (top.value.se or 0.0) / here.slope, top.at_s.se or 0.0
-            se = rounded(float(np.linalg.norm([se, *others])))
-        return (Estimate(at_s - to_peak_s, se),)
-
-    return narrowest(crossing, _FALL * (first_s - to_peak_s))[0]
+    se = None if found.se is None else rounded(float(np.hypot(found.se, top.at_s.se or 0.0)))
+    return Estimate(found.value - to_peak_s, se)
 
 
 def ripple(
