@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.protocols.base import Cell, Column, Curve, Found, Number, Run
-from xb_muscle_ros.protocols.figures import legend, lettered, looks
+from xb_muscle_ros.protocols.figures import at_level, legend, legend_of_pca, lettered, looks, shaded, shades
 from xb_muscle_ros.scores.estimate import Missing, notes_of
 from xb_muscle_ros.scores.force_velocity import HillCurve, fit_hill, hill_velocity
 from xb_muscle_ros.trials.trial import Array
@@ -101,18 +102,22 @@ def draw(figure: Any, found: Sequence[Found], traces: str) -> None:
         traces: what is drawn against time, ``length`` or ``force``.
     """
     record, velocity, power = figure.subplots(1, 3)
+    levels = shades(found)
     for look, each in looks(found):
-        for run in each.runs:
-            start_s = next((p.start_s for p in run.trial.facts.phases if p.name != "isometric"), 0.0)
-            shown = 100.0 * run.length_l0 if traces == "length" else run.force_f0
-            record.plot(run.time_s - start_s, shown, **look.trace)
         load = each.column("load")
-        velocity.plot(load, each.column("shortening_l0_per_s"), **look.points)
-        power.plot(load, each.column("power_f0_l0_per_s"), **look.points)
+        for level in levels:
+            of_level, mine = shaded(look, level), at_level(each, level)
+            for run in itertools.compress(each.runs, mine.tolist()):
+                start_s = next((p.start_s for p in run.trial.facts.phases if p.name != "isometric"), 0.0)
+                shown = 100.0 * run.length_l0 if traces == "length" else run.force_f0
+                record.plot(run.time_s - start_s, shown, **of_level.trace)
+            if np.any(mine):
+                velocity.plot(load[mine], each.column("shortening_l0_per_s")[mine], **of_level.points)
+                power.plot(load[mine], each.column("power_f0_l0_per_s")[mine], **of_level.points)
         if "hill" in each.curves:
-            curve = each.curves["hill"]
-            velocity.plot(curve.x, curve.y, **look.curve)
-            power.plot(*each.curves["power"], **look.curve)
+            curve, of_most = each.curves["hill"], shaded(look, levels[0]).curve
+            velocity.plot(curve.x, curve.y, **of_most)
+            power.plot(*each.curves["power"], **of_most)
     record.set(
         xlabel=f"time from the begin of the {'clamp' if traces == 'length' else 'ramp'} (s)",
         ylabel="length change (% L$_0$)" if traces == "length" else "force (F$_0$)",
@@ -123,6 +128,7 @@ def draw(figure: Any, found: Sequence[Found], traces: str) -> None:
         axis.axhline(0.0, color="black", linewidth=0.6)
         axis.set_xlim(left=0.0)
     legend(velocity)
+    legend_of_pca(record, levels)
     lettered([record, velocity, power])
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from xb_muscle_ros.protocols.base import Cell, Column, Found, Number, Option, Planned, Protocol, Run, Settings
-from xb_muscle_ros.protocols.figures import legend, lettered, looks
+from xb_muscle_ros.protocols.figures import at_level, legend, legend_of_pca, lettered, looks, shaded, shades
 from xb_muscle_ros.protocols.inputs import pca_option, planned_at_each_pca, rate_option
 from xb_muscle_ros.scores.estimate import Estimate, Missing, notes_of, quotient
 from xb_muscle_ros.scores.readout import isometric_force
@@ -104,15 +105,17 @@ class RedevelopmentRates(Protocol):
     def draw(self, figure: Any, found: Sequence[Found]) -> None:
         """Force after the restretch over that before, and k_tr against pCa and against force."""
         traces, by_pca, by_force = figure.subplots(1, 3, width_ratios=(1.3, 1.0, 1.0))
-        for look, each in looks(found):
+        levels = shades(found)
+        for (look, each), level in itertools.product(looks(found), levels):
+            of_level, mine = shaded(look, level), at_level(each, level)
             before = each.column("isometric_f0")
-            for run, force in zip(each.runs, before, strict=True):
+            for run, force in itertools.compress(zip(each.runs, before, strict=True), mine.tolist()):
                 end_s = restretch_end(run.trial.time_s, run.trial.length_change_l0)
                 if not isinstance(end_s, Missing) and np.isfinite(force) and force > 0.0:
-                    traces.plot(run.time_s - end_s, run.force_f0 / force, **look.trace)
+                    traces.plot(run.time_s - end_s, run.force_f0 / force, **of_level.trace)
             rates, errors = each.column("k_tr_per_s"), each.errors("k_tr_per_s")
-            by_pca.errorbar(each.column("pca"), rates, errors, **look.points, elinewidth=0.8)
-            by_force.errorbar(before, rates, errors, **look.points, elinewidth=0.8)
+            for axis, x in ((by_pca, each.column("pca")), (by_force, before)):
+                axis.errorbar(x[mine], rates[mine], errors[mine], **of_level.points, elinewidth=0.8)
         slowest = min((np.nanmin(each.column("k_tr_per_s")) for each in found if each.numbers), default=1.0)
         traces.set(xlabel="time after the restretch (s)", ylabel="force over that before")
         traces.set(xlim=(-0.15 * _DRAWN / slowest, _DRAWN / slowest), ylim=(-0.1, 1.4))
@@ -122,6 +125,7 @@ class RedevelopmentRates(Protocol):
         for axis in (by_pca, by_force):
             axis.set_ylim(bottom=0.0)
         legend(by_pca)
+        legend_of_pca(traces, levels)
         lettered([traces, by_pca, by_force])
 
     def size_mm(self, found: Sequence[Found]) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.protocols.base import Cell, Column, Found, Option, Planned, Protocol, Run, Settings
-from xb_muscle_ros.protocols.figures import legend, lettered, looks
+from xb_muscle_ros.protocols.figures import at_level, legend, legend_of_pca, lettered, looks, shaded, shades
 from xb_muscle_ros.protocols.inputs import facts_of, pca_option, planned_between, rate_option
 from xb_muscle_ros.scores.estimate import Estimate, notes_of
 from xb_muscle_ros.scores.local import crossing
@@ -93,8 +93,9 @@ class RampAndHold(Protocol):
         """Length and force from the begin of the ramp on."""
         (length, ramp), (force, hold) = figure.subplots(2, 2, height_ratios=(1.0, 2.4), sharex="col")
         longest_s = 0.0
-        for look, each in looks(found):
-            for run in each.runs:
+        levels = shades(found)
+        for (look, each), level in itertools.product(looks(found), levels):
+            for run in itertools.compress(each.runs, at_level(each, level).tolist()):
                 phase = _ramp(run)
                 if phase is None:
                     continue
@@ -102,13 +103,14 @@ class RampAndHold(Protocol):
                 longest_s = max(longest_s, phase.end_s - phase.start_s)
                 for above, below in ((length, force), (ramp, hold)):
                     above.plot(since, 100.0 * run.length_l0, color="black", linewidth=0.8)
-                    below.plot(since, run.force_f0, **look.trace)
+                    below.plot(since, run.force_f0, **shaded(look, level).trace)
         if longest_s:
             force.set_xlim(-0.3 * longest_s, 1.5 * longest_s)
         for above, below in ((length, force), (ramp, hold)):
             above.set_ylabel("length change\n(% L$_0$)")
             below.set(xlabel="time from the begin of the ramp (s)", ylabel="force (F$_0$)")
         legend(hold)
+        legend_of_pca(force, levels)
         lettered([length, ramp])
 
 

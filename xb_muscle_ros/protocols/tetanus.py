@@ -9,7 +9,7 @@ import numpy as np
 
 from xb_muscle_ros.protocols.base import Cell, Column, Found, Number, Option, Planned, Protocol, Run, Settings
 from xb_muscle_ros.protocols.calcium import pulse_train, transient_of, transient_options
-from xb_muscle_ros.protocols.figures import legend, lettered, logarithmic, looks
+from xb_muscle_ros.protocols.figures import legend, lettered, logarithmic, looks, plainly
 from xb_muscle_ros.protocols.inputs import facts_of, rate_option
 from xb_muscle_ros.protocols.stimulation import begun_s, stimulated
 from xb_muscle_ros.scores.estimate import Missing, notes_of
@@ -96,13 +96,16 @@ class Tetani(Protocol):
             for run in each.runs:
                 traces.plot(run.time_s - begun_s(run)[0], run.force_f0, **{**look.trace, "linewidth": 0.6})
             frequency = each.column("frequency_hz")
-            force.plot(frequency, each.column("peak_f0"), **look.points)
-            fusion.plot(frequency, each.column("fusion"), **look.points)
+            # Markers at the end of an axis are whole.
+            force.plot(frequency, each.column("peak_f0"), **look.points, clip_on=False, zorder=3)
+            fusion.plot(frequency, each.column("fusion"), **look.points, clip_on=False, zorder=3)
         fusion.axhline(_FUSED, color="black", linewidth=0.6, linestyle=":")
         traces.set(xlabel="time after the first pulse (s)", ylabel="force (F$_0$)")
         for axis, text in ((force, "last peak above rest (F$_0$)"), (fusion, "fusion index")):
             axis.set(xlabel="frequency of stimulation (1/s)", ylabel=text)
             logarithmic(axis)
+            if axis.get_xscale() == "log":
+                plainly(axis.xaxis)
             axis.set_ylim(bottom=0.0)
         legend(force)
         lettered([traces, force, fusion])
