@@ -200,6 +200,19 @@ def test_half_relaxation_beyond_a_noisy_record_is_none() -> None:
     assert all(found)
 
 
+def test_the_largest_force_of_a_train_of_unknown_pulses_has_its_error() -> None:
+    """Regression: it was the largest of all noisy samples."""
+    made = xb.run_protocol("tetanus", "18Dec2017a", frequency=50.0, as_measured=True, tell=lambda line: None)
+    (trial,) = made.trials
+    true = float(np.max(trial.force_n) - trial.force_n[0])
+    bare = replace(trial, facts=replace(trial.facts, protocol="", settings=()))
+    noise = 0.02 * np.random.default_rng(3).standard_normal(trial.force_n.size)
+    noisy = replace(bare, force_n=trial.force_n + noise)
+    peak = xb.analyse_protocol("tetanus", [noisy], tell=lambda line: None).results[0].rows[0]["peak_f0"]
+    assert 0.0 < peak.se < 0.03
+    assert abs(peak.value - true) < 0.5 * (np.max(noisy.force_n) - np.max(trial.force_n))
+
+
 def test_a_train_that_is_cut_has_no_fusion() -> None:
     made = xb.run_protocol("tetanus", "18Dec2017a", frequency=5.0, as_measured=True, tell=lambda line: None)
     (trial,) = made.trials

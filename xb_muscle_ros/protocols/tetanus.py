@@ -14,7 +14,7 @@ from xb_muscle_ros.protocols.inputs import facts_of, rate_option
 from xb_muscle_ros.protocols.stimulation import begun_s, stimulated
 from xb_muscle_ros.scores.estimate import Missing, notes_of
 from xb_muscle_ros.scores.standard_error import noise_between
-from xb_muscle_ros.scores.twitch import level_before, ripple
+from xb_muscle_ros.scores.twitch import largest, level_before, ripple
 from xb_muscle_ros.trials.protocol import ALLOWED, Allowed
 
 _LEAD_S, _AFTER_S = 0.05, 0.5
@@ -80,7 +80,7 @@ class Tetani(Protocol):
             row: dict[str, Cell] = {"trial": name, "frequency_hz": frequency, "rest_f0": rest}
             if frequency is None or last_s is None:
                 notes += [(name, f"pulse: {guessed}"), (name, "fusion: the trial does not tell its pulses")]
-                rows.append(row | {"peak_f0": float(np.max(run.force_f0)) - rest.value})
+                rows.append(row | {"peak_f0": largest(run.time_s, run.force_f0, rest.value, noise)})
                 continue
             found = ripple(run.time_s, run.force_f0, rest.value, (last_s - 1.0 / frequency, last_s), noise)
             if isinstance(found, Missing):

@@ -175,6 +175,15 @@ def _half_relaxation(t: Array, force: Array, top: Extreme, noise: ForceNoise | N
     return Estimate(found.value - to_peak_s, se)
 
 
+def largest(time_s: Array, force_f0: Array, rest_f0: float, noise: ForceNoise | None = None) -> Estimate:
+    """The largest force above rest of a whole record, F0, by parabolas of 10 ms at most."""
+    if time_s.size < FEWEST:
+        return Estimate(None, why=f"a parabola through force needs {FEWEST} samples")
+    force, ends = force_f0 - rest_f0, (float(time_s[0]), float(time_s[-1]))
+    widest_s = min(_RIPPLE_S, _SHARP * _until_half(time_s, force, int(np.argmax(force))))
+    return narrowest(lambda width_s: (extreme(time_s, force, ends, width_s, 1.0, noise).value,), widest_s)[0]
+
+
 def ripple(
     time_s: Array, force_f0: Array, rest_f0: float, last_pulses_s: tuple[float, float], noise: ForceNoise | None = None
 ) -> Ripple | Missing:
