@@ -90,7 +90,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--format", choices=FORMATS, help="format of the files (default: what each looks like)")
     common.add_out(parser, "folder of the bags", "bags")
     for option, (key, kind, text) in _OPTIONS.items():
-        parser.add_argument(option, type=kind, dest=key, metavar=option.rpartition("-")[2].upper(), help=text)
+        names = (option, "--fibre") if key == "fibre" else (option,)
+        parser.add_argument(*names, type=kind, dest=key, metavar=option.rpartition("-")[2].upper(), help=text)
     parser.add_argument(
         "--isometric-scaling", action=argparse.BooleanOptionalAction,
         help="scale each trial's force to the isometric trial of its pCa (default: where the mapping has the table)",

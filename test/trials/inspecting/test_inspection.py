@@ -114,10 +114,12 @@ def test_an_unknown_unit_of_a_named_signal_is_left_to_be_filled_in(tmp_path: Pat
     assert not found.imports
 
 
+@pytest.mark.parametrize("length", ["length_mm", "Length pCa {} (mm)", "L_pCa{} (mm)"])
 @pytest.mark.parametrize("name", ["pCa {} (mN)", "Force pCa {} (mN)", "F_pCa{} [mN]"])
-def test_a_column_for_each_pca_is_a_trial_each(tmp_path: Path, name: str) -> None:
+def test_a_column_for_each_pca_is_a_trial_each(tmp_path: Path, name: str, length: str) -> None:
     forces = {name.format(6.1): 0.5 * FORCE_MN, name.format(4.5): FORCE_MN}
-    file = table(tmp_path / "a.csv", {"time_s": TIME_S, "length_mm": LENGTH_MM, **forces}, comments="# F0 = 0.5 mN\n")
+    columns = {"time_s": TIME_S, length.format(6.1): LENGTH_MM, length.format(4.5): LENGTH_MM, **forces}
+    file = table(tmp_path / "a.csv", columns, comments="# F0 = 0.5 mN\n")
     found = inspect_file(file)
     assert found.imports
     assert {found.recognition.taken_for[each] for each in forces} == {"force of a trial, whose pCa its name tells"}
@@ -125,6 +127,53 @@ def test_a_column_for_each_pca_is_a_trial_each(tmp_path: Path, name: str) -> Non
     events = imports([file], found.proposal.text, tmp_path / "out")
     assert [event.trial.facts.pca for event in events] == [6.1, 4.5]
     assert events[0].trial.force_n == pytest.approx(0.5e-3 * FORCE_MN, rel=1e-6)
+
+
+def test_a_calcium_beside_columns_of_a_pca_each_is_left_out(tmp_path: Path) -> None:
+    forces = {"pCa 6.1 (F0)": FORCE_MN, "pCa 4.5 (F0)": FORCE_MN}
+    columns = {"time_s": TIME_S, "length_mm": LENGTH_MM, **forces, "pCa": np.full(400, 6.1)}
+    found = inspect_file(table(tmp_path / "a.csv", columns))
+    assert found.imports
+    assert "'pCa' is left out, since the names of columns tell the pCa of each trial" in found.recognition.remarks
+
+
+def test_columns_of_a_pca_without_words_or_units_are_force_of_an_unknown_unit(tmp_path: Path) -> None:
+    forces = {"F_pCa61": FORCE_MN, "F_pCa45": FORCE_MN}
+    found = inspect_file(table(tmp_path / "a.csv", {"time_s": TIME_S, "length_mm": LENGTH_MM, **forces}))
+    assert found.proposal.tree["columns"]["force"]["factors"] == {"pca": 0.1}
+    assert [line.partition(":")[0] for line in found.proposal.missing] == ["unit of force (F_pCa61)", "f0"]
+
+
+@pytest.mark.parametrize(("names", "key"), [(("pCa9", "pCa6.2"), "file_name"), (("pCa62", "pCa4.5"), "per_file")])
+def test_files_whose_names_tell_their_pca_differently(tmp_path: Path, names: tuple[str, str], key: str) -> None:
+    columns = {"time_s": TIME_S, "length_mm": LENGTH_MM, "force (F0)": FORCE_MN}
+    files = [table(tmp_path / f"run_{name}.csv", columns) for name in names]
+    proposed = one_mapping([inspect_file(file) for file in files])
+    assert key in proposed.tree
+    assert not proposed.missing
+    events = imports(files, proposed.text, tmp_path / "out")
+    expected = [9.0, 6.2] if key == "file_name" else [6.2, 4.5]
+    assert sorted(event.trial.facts.pca or 0.0 for event in events) == sorted(expected)
+
+
+@pytest.mark.parametrize("name", ["Force_MG", "Force MG", "Force_G"])
+def test_a_muscle_is_no_unit(tmp_path: Path, name: str) -> None:
+    columns = {"time_s": TIME_S, "Length (mm)": LENGTH_MM, name: FORCE_MN}
+    found = inspect_file(table(tmp_path / "a_pCa45.csv", columns))
+    assert f"unit of force ({name})" in [line.partition(":")[0] for line in found.proposal.missing]
+
+
+def test_passive_force_is_no_pressure(tmp_path: Path) -> None:
+    columns = {"time_s": TIME_S, "Length (mm)": LENGTH_MM, "F_act": FORCE_MN, "F_pa": FORCE_MN}
+    assert "force" not in inspect_file(table(tmp_path / "a_pCa45.csv", columns)).recognition.roles
+
+
+def test_percent_beside_an_absolute_unit_tells_l0_and_f0(tmp_path: Path) -> None:
+    relative = {"length (%L0)": 100.0 * LENGTH_MM / 1.2, "force (%F0)": 100.0 * FORCE_MN / 0.6}
+    columns = {"time_s": TIME_S, "length_mm": LENGTH_MM, "force_mN": FORCE_MN, **relative}
+    remarks = inspect_file(table(tmp_path / "a_pCa45.csv", columns)).recognition.remarks
+    told = [float(line.rpartition(" is ")[2].split()[0]) for line in remarks]
+    assert told == pytest.approx([1.2, 0.6], rel=1e-5)
 
 
 def test_columns_of_pca_in_other_units_are_left_open(tmp_path: Path) -> None:

@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lab_tables import NAMES, rows
+from lab_tables import trials as lab_trials
+from lab_tables import write as lab_write
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.csv import read_csv
@@ -230,6 +233,16 @@ def test_bad_numbers_are_refused_by_line_and_column(
         read_csv(_file(tmp_path, time, length, force), _mapping("L0", "F0"))
     assert words in str(refused.value)
     assert "trial_7.csv" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "pca", "told"),
+    [("fa_pCa6.2", 4.5, True), ("fa_pCa62", 6.2, False), ("fa_pCa4_5", 4.5, False), ("pCa6.2_to_pCa4.5", 6.2, False)],
+)
+def test_a_file_that_is_called_by_another_pca_is_told(tmp_path: Path, name: str, pca: float, told: bool) -> None:
+    (trial,) = lab_trials(lab_write(tmp_path, [",".join(NAMES), *rows()], f"{name}.csv"), pca=pca)
+    line = "the file's name tells pCa 6.2, the trial has 4.5; check both"
+    assert any(line in warning for warning in trial.warnings) == told
 
 
 def test_a_change_taken_for_a_length_is_refused(tmp_path: Path) -> None:

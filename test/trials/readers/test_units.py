@@ -62,8 +62,13 @@ def test_units_as_files_write_them(text: str, column: str, name: str | None) -> 
 
 
 def test_an_unknown_unit_is_answered_with_the_nearest() -> None:
-    with pytest.raises(UserError, match="here: unit 'kpa' of force is not known; did you mean 'kPa'"):
-        unit_of("kpa", "force", "here")
+    with pytest.raises(UserError, match="here: unit 'kPas' of force is not known; did you mean 'kPa'"):
+        unit_of("kPas", "force", "here")
+
+
+@pytest.mark.parametrize(("text", "factor"), [("%Po", 0.01), ("P/Po", 1.0), ("kpa", 1e3), ("grams", 9.80665e-3)])
+def test_other_spellings_are_units_too(text: str, factor: float) -> None:
+    assert unit_of(text, "force", "here").factor == factor
 
 
 def test_a_unit_of_something_else_is_refused() -> None:
@@ -77,6 +82,8 @@ def test_quantities_come_in_base_units() -> None:
     assert quantity("1e-3N", "force", "f0", "here") == Quantity(1e-3, "force")
     assert quantity("100%L0", "length", "reference_length", "here") == Quantity(pytest.approx(1.0), "relative length")
     assert quantity(" 97 kPa", "force", "f0", "here") == Quantity(97e3, "stress")
+    assert quantity("20 N cm-2", "force", "f0", "here") == Quantity(2e5, "stress")
+    assert quantity("80 % Po", "force", "f0", "here") == Quantity(0.8, "relative force")
 
 
 @pytest.mark.parametrize("text", ["42.8", "mm", "4 2.8 mm", "-1 mm", "0 mm", "nan mm", "inf mm", "long mm", ""])

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from xb_muscle_ros.trials.readers.description import name_of
+from xb_muscle_ros.trials.readers.calcium import pcas_in
+from xb_muscle_ros.trials.readers.description import fact_of, name_of
 
 # Others are no trial's: 10 without its point is pCa 10 and not 1.
 _USUAL_PCA = (3.0, 12.0)
@@ -27,11 +28,9 @@ _PATTERNS: tuple[tuple[str, dict[str, float]], ...] = (
         r"amp(?P<amplitude_l0>\d+)_rt(?P<recovery_s>\d+)ms_pca(?P<pca>\d+)",
         {"amplitude_l0": 1e-4, "recovery_s": 1e-3, "pca": 0.1},
     ),
-    (r"[pP][cC][aA][ _=-]?(?P<pca>\d{1,2}\.\d+)", {}),
     # pCa4_5 may be 4.5, or 4 and the fifth trial.
-    (r"[pP][cC][aA][ _=-]?(?P<pca>\d)(?!\d|[._,p-]\d)", {}),
-    (r"[pP][cC][aA][ _=-]?(?P<pca>\d{2})(?!\d|\.\d)", {"pca": 0.1}),
-    (r"[pP][cC][aA][ _=-]?(?P<pca>1\d)(?!\d|\.\d)", {}),
+    (r"[pP][cC][aA][ _=-]?(?P<pca>\d{1,2}[.,]\d+|1[0-2](?![\d.,])|\d(?!\d|[._,p-]\d))", {}),
+    (r"[pP][cC][aA][ _=-]?(?P<pca>\d{2})(?![\d.,])", {"pca": 0.1}),
     (r"(?<!\d)(?P<pca>\d{2})[pP][cC][aA]", {"pca": 0.1}),
 )
 
@@ -42,9 +41,11 @@ def name_pattern(paths: Sequence[Path]) -> NamePattern | None:
 
 
 def sheet_pattern(sheets: Sequence[str]) -> NamePattern | None:
-    """The same of several sheets, for their whole names."""
-    found = pattern_in(sheets) if len(sheets) > 1 else None
-    return None if found is None else found._replace(pattern=f".*{found.pattern}.*")
+    """The same of those of several sheets that tell a pCa, for their whole names; None where one tells two."""
+    told = {sheet: len(pcas_in(sheet)) for sheet in sheets}
+    named = [sheet for sheet, count in told.items() if count]
+    found = pattern_in(named) if len(named) > 1 and max(told.values()) == 1 else None
+    return None if found is None else found._replace(pattern=f".*?{found.pattern}.*")
 
 
 def column_pattern(columns: Sequence[str]) -> NamePattern | None:
@@ -75,7 +76,7 @@ def pattern_in(names: Sequence[str]) -> NamePattern | None:
 
 def _found(pattern: str, factors: dict[str, float], name: str) -> dict[str, float] | None:
     match = re.search(pattern, name)
-    if match is None:
+    if match is None or len(pcas_in(name)) > 1:
         return None
-    values = {key: float(f"{float(text) * factors.get(key, 1.0):.12g}") for key, text in match.groupdict().items()}
+    values = {key: fact_of(text, factors.get(key, 1.0), key, name) for key, text in match.groupdict().items()}
     return values if _USUAL_PCA[0] <= values["pca"] <= _USUAL_PCA[1] else None

@@ -42,6 +42,8 @@ def propose(
     each: list[Mapping[str, str]] = [facts_of(contents)] if facts_of_each is None else list(facts_of_each)
     if by_format:  # its reader knows them
         each = [{}]
+    elif len(paths) > 1 and not found.patterns and "calcium" not in found.roles:
+        each = _with_names(paths, each)
     everywhere = [key for key in each[0] if all(key in one for one in each)]
     facts = {key: each[0][key] for key in everywhere}
     apart = [key for key in everywhere if any(one[key] != facts[key] for one in each)]
@@ -62,8 +64,11 @@ def propose(
         _f0(made, reader, found, facts)
     sheets = sheet_pattern(contents.sheets) if not calcium and len(paths) == 1 else None
     if sheets is not None:
-        made.add(0, "sheet:", "of sheets, whose names tell the pCa of their trials")
+        out = [f"'{sheet}'" for sheet in contents.sheets if not pcas_in(sheet)]
+        why = f"their names tell the pCa of their trials{'; left out: ' if out else ''}{', '.join(out)}"
+        made.add(0, "sheet:", f"guess: {why}")
         made.pattern(1, sheets)
+        made.guesses.append(f"sheets: {why}")
     told = by_format and any(pcas_in(f"{name} {text}") for name, text in contents.facts.items())
     _facts(made, facts, name_pattern(paths), calcium or told or sheets is not None)
     if apart:
@@ -71,9 +76,18 @@ def propose(
     return made
 
 
+def _with_names(paths: Sequence[Path], each: Sequence[Mapping[str, str]]) -> list[Mapping[str, str]]:
+    """Facts of files with the pCa that each name tells, where all tell one and no pattern reads all of them."""
+    own = [name_pattern([path]) for path in paths]
+    if name_pattern(paths) is not None or any(pattern is None for pattern in own):
+        return list(each)
+    told = [{"pca": f"{pattern.found['pca']:g}"} for pattern in own if pattern is not None]
+    return [{**name, **facts} for name, facts in zip(told, each, strict=True)]
+
+
 def _per_file(made: Proposal, paths: Sequence[Path], each: Sequence[Mapping[str, str]], apart: Sequence[str]) -> None:
     """Facts that differ from file to file; they go before those above."""
-    made.add(0, "per_file:", "as each file tells")
+    made.add(0, "per_file:", "as each file, or its name, tells")
     for path, facts in zip(paths, each, strict=True):
         made.add(1, f"- files: {scalar(f'^{re.escape(name_of(path))}$')}")
         for key in apart:

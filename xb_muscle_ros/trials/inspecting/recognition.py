@@ -13,7 +13,7 @@ import numpy as np
 
 from xb_muscle_ros.trials.inspecting.names import NamePattern, column_pattern
 from xb_muscle_ros.trials.inspecting.words import OTHER_UNITS, Named, fitting, read_name, roles_of_unit, units_meant
-from xb_muscle_ros.trials.readers.calcium import SAME_PCA, pcas_in
+from xb_muscle_ros.trials.readers.calcium import PCA_NUMBER, SAME_PCA, pcas_in
 from xb_muscle_ros.trials.readers.columns import SIGNALS
 from xb_muscle_ros.trials.readers.contents import Content, Contents
 from xb_muscle_ros.trials.readers.units import KINDS, UNITS, volts_of
@@ -89,6 +89,10 @@ def recognise(contents: Contents, beside: bool = False) -> Recognition:
         if role == "time" and any(content.times_s is not None for content in contents.signals):
             continue  # a bag's messages have stamps
         _settle(found, role, each, beside)
+    if found.patterns and "calcium" in found.roles:
+        label = found.roles.pop("calcium").content.label
+        found.taken_for[label] = "is called calcium; the names of columns tell the pCa of each trial"
+        found.remarks.append(f"'{label}' is left out, since the names of columns tell the pCa of each trial")
     return found
 
 
@@ -108,11 +112,13 @@ def _looked_at(content: Content) -> tuple[Recognised | None, str]:
     roles = tuple(role for role in named.roles if role in SIGNALS)
     if len(roles) > 1:
         by_unit = tuple(role for role in roles if unit and fitting(unit, role))
+        if len(by_unit) > 1:  # mm may be mM, though not as it is written
+            by_unit = tuple(role for role in by_unit if UNITS[units_meant(unit)[0]].kind in KINDS[role])
         if len(by_unit) != 1:
             return None, f"its name may be that of {' or '.join(roles)}"
         roles = by_unit
-    if roles == ("calcium",) and _is_at_pca(content):
-        role = next((role for role in ("force", "length") if unit and fitting(unit, role)), "force")
+    if not set(roles) - {"calcium"} and _is_at_pca(content):
+        role = _role_at_pca(content.name, unit)
         return Recognised(content, role, fitting(unit, role) if unit else "", "called by a pCa", True, named), ""
     if roles:
         return _by_name(content, roles[0], unit, named)
@@ -127,6 +133,13 @@ def _is_at_pca(content: Content) -> bool:
     """Whether a column is called by a pCa and holds something else, which was recorded at that pCa."""
     told = () if content.field else pcas_in(content.name)
     return len(told) == 1 and bool(np.any(np.abs(content.finite - told[0]) > SAME_PCA))
+
+
+def _role_at_pca(name: str, unit: str) -> str:
+    """Of a column that is called by a pCa: by what stands before that (``L_pCa6.2``), by its unit, or else force."""
+    before = PCA_NUMBER.split(name, maxsplit=1)[0].strip(" _-.:,")
+    told = [*read_name(before).roles, *(role for role in ("force", "length") if unit and fitting(unit, role))]
+    return next((role for role in told if role in ("force", "length")), "force")
 
 
 def _by_name(content: Content, role: str, unit: str, named: Named) -> tuple[Recognised | None, str]:
@@ -227,7 +240,7 @@ def _one_of_the_same(found: Recognition, role: str, candidates: list[Recognised]
     found.taken_for[other.content.label] = f"is '{kept.content.label}' in another unit"
     found.remarks.append(
         f"'{relative[0].content.label}' is '{absolute[0].content.label}' in another unit: "
-        f"{'L0' if role == 'length' else 'F0'} is {factor:.9g} {absolute[0].unit}"
+        f"{'L0' if role == 'length' else 'F0'} is {scale / UNITS[absolute[0].unit].factor:.9g} {absolute[0].unit}"
     )
     return [kept]
 

@@ -66,6 +66,7 @@ OTHER_UNITS = {
     "pixel": "pixels", "px": "pixels", "au": "arbitrary units", "a.u.": "arbitrary units", "min": "minutes",
 }  # fmt: skip
 _MASSES = ("kg", "g", "mg")
+_ABBREVIATIONS = {unit.casefold() for unit in (*_MASSES, "Pa")}
 _BRACKETS = re.compile(r"^(?P<name>.*?)\s*[(\[{](?P<unit>[^()\[\]{}]*)[)\]}]\s*$")
 _INDEX = re.compile(r"(?=.*(?::|trial))[\d:,\s]*(?:trial)?[\d:,\s]*")
 _SLASH = re.compile(r"^(?P<name>.+?)\s+(?:/|in|,)\s+(?P<unit>\S+)$|^(?P<name2>.+?),\s*(?P<unit2>\S+)$")
@@ -120,6 +121,11 @@ def roles_of_unit(text: str) -> tuple[str, ...]:
     return tuple(role for role, kinds in KINDS.items() if role != "rate" and meant and UNITS[meant[0]].kind in kinds)
 
 
+def _is_abbreviation(unit: str) -> bool:
+    """Whether what ends a name is a unit by its letters alone: ``Force_MG`` is of a muscle, ``F_pa`` is passive."""
+    return unit not in UNITS and unit.casefold() in _ABBREVIATIONS
+
+
 def read_name(name: str) -> Named:
     """What a column, channel or joint is by its name."""
     rest, unit = _split(unicodedata.normalize("NFKC", name).strip())
@@ -160,7 +166,8 @@ def _split(name: str) -> tuple[str, str]:
             continue
         parts = match.groupdict()
         rest, unit = parts["name"] or parts["name2"], parts["unit"] or parts["unit2"]
-        if (units_meant(unit) and unit != "1") or (len(unit) > 1 and unit.casefold() in OTHER_UNITS):
+        known = units_meant(unit) and unit != "1" and not _is_abbreviation(unit)
+        if known or (len(unit) > 1 and unit.casefold() in OTHER_UNITS):
             return rest.strip(), unit
     return name, ""
 

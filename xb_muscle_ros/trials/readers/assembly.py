@@ -11,6 +11,7 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError, naming
 from xb_muscle_ros.trials.checks import belied, unusual
+from xb_muscle_ros.trials.inspecting.names import name_pattern
 from xb_muscle_ros.trials.mains import hum_line, notched
 from xb_muscle_ros.trials.phases import conditioning
 from xb_muscle_ros.trials.readers.base import Draft, Recording, Signal
@@ -113,13 +114,20 @@ def made_of(recording: Recording, mapping: ImportMapping, path: Path, isometric_
 
 
 def _check_name(draft: Draft, pca: float | None, path: Path) -> None:
-    """Warn where what a trial is called within its file tells another pCa."""
-    own = draft.recording.trial.removeprefix(filled(draft.mapping.trial, path))
-    told = pcas_in(own)
-    if pca is not None and len(told) == 1 and abs(told[0] - pca) > SAME_PCA:
-        draft.warn(
-            f"the name of the trial, '{draft.recording.trial}', tells pCa {told[0]:g}, it has {pca:g}; check both"
-        )
+    """Warn where what a trial is called within its file, or else the file, tells another pCa."""
+    if pca is None:
+        return
+    told = pcas_in(draft.recording.trial.removeprefix(filled(draft.mapping.trial, path)))
+    if told:
+        if len(told) == 1 and abs(told[0] - pca) > SAME_PCA:
+            draft.warn(
+                f"the name of the trial, '{draft.recording.trial}', tells pCa {told[0]:g}, it has {pca:g}; check both"
+            )
+        return
+    named = name_pattern([path])
+    # What a pattern of the mapping reads in the name was compared before.
+    if named is not None and "pca" not in draft.mapping.named(path) and abs(named.found["pca"] - pca) > SAME_PCA:
+        draft.warn(f"the file's name tells pCa {named.found['pca']:g}, the trial has {pca:g}; check both")
 
 
 def _with_shown_facts(draft: Draft, trial: Trial, path: Path, shown: Mapping[str, float | None]) -> Trial:

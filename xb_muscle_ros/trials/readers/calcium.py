@@ -23,12 +23,12 @@ PCA_RANGE = (6.0 - math.log10(CALCIUM_UM), 12.0)
 # pCa is noted to a tenth.
 SAME_PCA = 0.05
 PCA_COLUMN = re.compile(r"p[ _-]?ca([^a-z0-9]|$)", re.IGNORECASE)
-_PCA_IN_WORDS = re.compile(r"p[ _-]?ca[ _=:-]*(\d+(?:[.,]\d+)?)", re.IGNORECASE)
+PCA_NUMBER = re.compile(r"p[ _-]?ca[ _=:-]*(\d+(?:[.,]\d+)?)", re.IGNORECASE)
 
 
 def pcas_in(words: str) -> list[float]:
     """The pCa that a name or comment tells, in its order, each once; 61 is 6.1."""
-    told = [float(text.replace(",", ".")) for text in _PCA_IN_WORDS.findall(words)]
+    told = [float(text.replace(",", ".")) for text in PCA_NUMBER.findall(words)]
     return list(dict.fromkeys(each / 10.0 if each > PCA_RANGE[1] else each for each in told))
 
 

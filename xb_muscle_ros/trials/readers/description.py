@@ -197,12 +197,12 @@ class ImportMapping:
 
 
 def fact_of(text: str, factor: float, name: str, where: str) -> float:
-    """A fact that a name tells, to 12 digits, so that 61 tenths are 6.1.
+    """A fact that a name tells, with a decimal point or comma, to 12 digits, so that 61 tenths are 6.1.
 
     Raises:
         UserError: it is no finite number.
     """
-    return float(f"{finite(text, name, where) * factor:.12g}")
+    return float(f"{finite(text.replace(',', '.'), name, where) * factor:.12g}")
 
 
 def name_of(path: Path) -> str:

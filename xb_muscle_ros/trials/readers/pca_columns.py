@@ -26,11 +26,13 @@ def check_pca(table: Table, mapping: ImportMapping, part: Part, pca: float | Non
         yield f"{table.where}: the sheet is called by pCa {told[0]:g}, the trial has {pca:g}; check both"
     force = part.columns.get("force", "")
     patterns = [column.pattern for column in mapping.columns.values() if column.pattern is not None]
+    # Names of columns that tell pCa go before a column of it, which is of one trial at most.
+    of_names = any("pca" in pattern.groupindex for pattern in patterns)
     others = []
     for name in table.header:
         stated = next(iter(pcas_in(name)), None)
         if stated is None:
-            if PCA_COLUMN.match(name):
+            if PCA_COLUMN.match(name) and not of_names:
                 _check_column(table, name, part, pca)
             continue
         if abs(stated - pca) > SAME_PCA and name == force:

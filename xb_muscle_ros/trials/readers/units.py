@@ -78,7 +78,7 @@ _PER_VOLT = re.compile(
 # A number and its unit, with a blank between them or without.
 _NUMBER_AND_UNIT = re.compile(
     r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
-    r"(?:\s+(?P<apart>\S+)|(?![eE][+-]?\d)(?P<joined>[^\W\d_]\S*|%\S*))\s*"
+    r"(?:\s+(?P<apart>(?:[^\W\d_]|%).*?)|(?![eE][+-]?\d)(?P<joined>[^\W\d_]\S*|%\S*))\s*"
 )
 VOLTS = ("V", "mV")
 # A stress by its area: ``mN/mm^2``, ``N cm-2``, ``kN.m^-2``.
@@ -111,6 +111,7 @@ def unit_of(text: str, column: str, where: str) -> Unit:
         UserError: unknown unit, one of something else, or a calibration of zero.
     """
     name = simple(text)
+    name = _SPELLINGS.get(name, name)
     allowed = [known for known, unit in UNITS.items() if unit.kind in KINDS[column]]
     if column in _CALIBRATED and name.rpartition("/")[2] in VOLTS and name.rpartition("/")[0] in allowed:
         raise UserError(f"{where}: unit '{text}' of {column} lacks the number before it, for example '0.5 {text}'")
