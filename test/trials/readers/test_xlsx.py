@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import re
 import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -88,7 +89,7 @@ def test_a_sheet_that_is_called_by_another_pca_is_told(tmp_path: Path) -> None:
     assert "the sheet is called by pCa 6.1, the trial has 4.5; check both" in lab.told(alone)
 
 
-@pytest.mark.parametrize("number_format", ["0.00%", "0%", '0.000%" of L0"'])
+@pytest.mark.parametrize("number_format", ["0.00%", "0%", '0.000%" of L0"', "0.0_)%"])
 @pytest.mark.parametrize(
     ("names", "told"),
     [
@@ -113,7 +114,7 @@ def test_cells_that_show_percent(tmp_path: Path, number_format: str, names: list
     assert lab.told(trial).count(told) == 2
 
 
-@pytest.mark.parametrize("number_format", ["0.00", '0.0" %"', "0.0\\%"])
+@pytest.mark.parametrize("number_format", ["0.00", '0.0" %"', "0.0\\%", "0.00_%", "0.0*%"])
 def test_a_sign_of_percent_that_is_text_is_none(tmp_path: Path, number_format: str) -> None:
     path = book(tmp_path, run=[["time_s", "length (%L0)"], *([t, 100 * length / 1.2] for t, length, _ in ROWS)])
     made = openpyxl.load_workbook(path)
@@ -124,6 +125,76 @@ def test_a_sign_of_percent_that_is_text_is_none(tmp_path: Path, number_format: s
     (trial,) = lab.trials(path, columns=columns, f0=None, reference_length=None)
     assert trial.length_change_l0 == pytest.approx(lab.LENGTH_MM / 1.2 - 1.0, abs=1e-12)
     assert "show percent" not in lab.told(trial)
+
+
+PERCENT = {"time": {"column": "time_s"}, "length": {"column": "length (%L0)"}}
+
+
+Change = tuple[str, str | Callable[[re.Match[str]], str]]
+
+
+def rewritten(path: Path, part: str, *changes: Change) -> Path:
+    """The workbook with some of its parts changed by regular expressions, each of which matches somewhere."""
+    with zipfile.ZipFile(path) as file:
+        parts = {name: file.read(name).decode() for name in file.namelist()}
+    for old, new in changes:
+        found = {name: re.subn(old, new, text) for name, text in parts.items() if re.fullmatch(part, name)}
+        assert any(count for _, count in found.values()), old
+        parts.update({name: text for name, (text, _) in found.items()})
+    with zipfile.ZipFile(path, "w") as file:
+        for name, text in parts.items():
+            file.writestr(name, text)
+    return path
+
+
+def half_percent(
+    folder: Path, head: str = "length (%L0)", scale: float = 100.0, above: Sequence[Sequence[Any]] = ()
+) -> Path:
+    """A length in L0 whose odd samples are formatted as percent; the others are larger by a scale."""
+    values = [length / 1.2 if i % 2 else scale * length / 1.2 for i, (_, length, _) in enumerate(ROWS)]
+    path = book(folder, run=[*above, ["time_s", head], *([t, v] for (t, _, _), v in zip(ROWS, values, strict=True))])
+    made = openpyxl.load_workbook(path)
+    for row in range(len(above) + 3, made["run"].max_row + 1, 2):
+        made["run"].cell(row, 2).number_format = "0.0%"
+    made.save(path)
+    return path
+
+
+STRICT = (
+    (r"http://schemas.openxmlformats.org/spreadsheetml/2006/main", "http://purl.oclc.org/ooxml/spreadsheetml/main"),
+    (r"http://schemas.openxmlformats.org/officeDocument/2006/rel", "http://purl.oclc.org/ooxml/officeDocument/rel"),
+)
+
+
+@pytest.mark.parametrize(
+    ("part", "changes"),
+    [
+        pytest.param("none", (), id="plain"),
+        pytest.param("xl/worksheets/.*", ((r'<c r="[A-Z]+\d+"', "<c"),), id="cells without places"),
+        pytest.param("xl/worksheets/.*", ((r'<(c|row) r="\w+"', r"<\1"),), id="rows and cells without places"),
+        pytest.param("xl/.*xml(.rels)?", STRICT, id="strict"),
+    ],
+)
+def test_percent_is_read_cell_by_cell(tmp_path: Path, part: str, changes: tuple[Change, ...]) -> None:
+    (trial,) = lab.trials(rewritten(half_percent(tmp_path), part, *changes), PERCENT, f0=None, reference_length=None)
+    assert trial.length_change_l0 == pytest.approx(lab.LENGTH_MM / 1.2 - 1.0, abs=1e-12)
+    line = f"{lab.N // 2} of {lab.N} cells of column 'length (%L0)' show percent, as its header says: 5 % is read as 5"
+    assert f"{line}; the other {lab.N - lab.N // 2} are read as they stand" in lab.told(trial)
+
+
+def test_places_of_percent_are_those_of_the_sheet_with_gaps_above(tmp_path: Path) -> None:
+    path = half_percent(tmp_path, above=[["rig 3"], [], []])
+    (trial,) = lab.trials(path, PERCENT, f0=None, reference_length=None)
+    assert trial.length_change_l0 == pytest.approx(lab.LENGTH_MM / 1.2 - 1.0, abs=1e-12)
+
+
+def test_a_mixed_column_without_percent_in_the_header_is_told(tmp_path: Path) -> None:
+    columns = {**PERCENT, "length": {"column": "length", "unit": "mm"}}
+    (trial,) = lab.trials(half_percent(tmp_path, "length", scale=1.0), columns, f0=None)
+    assert trial.length_m == pytest.approx(1e-3 * lab.LENGTH_MM / 1.2, rel=1e-12)
+    assert f"{lab.N // 2} of {lab.N} cells of column 'length' show percent, and have no % in the header" in lab.told(
+        trial
+    )
 
 
 def test_text_numbers_units_and_preamble(tmp_path: Path) -> None:
@@ -286,3 +357,101 @@ def test_formulas_that_nothing_has_worked_out_are_told_with_the_remedy(tmp_path:
     )
     everything = book(tmp_path, name="u.xlsx", run=[lab.NAMES, *([f"={i}/1000", "=1.2", "=0.3"] for i in range(50))])
     assert f"row 2, column '{lab.NAMES[0]}' holds a formula without its value" in lab.refusal(everything)
+
+
+def with_values(folder: Path, values: Sequence[str], marked: bool, formula: str = "=D{row}*2") -> Path:
+    """Forces by formulas, beside which a program has put values; marked as formulas that are to be worked out."""
+    path = book(
+        folder, run=[lab.NAMES, *([t, length, formula.format(row=i)] for i, (t, length, _) in enumerate(ROWS, 2))]
+    )
+    left = iter(values)
+    rewritten(path, "xl/worksheets/.*", (r"</f><v ?/>|</f><v></v>", lambda _: f"</f>{next(left)}"))
+    assert next(left, None) is None
+    return path if marked else rewritten(path, "xl/workbook.xml", (' fullCalcOnLoad="1"', ""))
+
+
+NOUGHT = ["<v>0</v>"] * lab.N
+GIVEN = [f"<v>{f!r}</v>" for f in lab.FORCE_MN.tolist()]
+
+
+@pytest.mark.parametrize(
+    ("values", "changes", "row", "run"),
+    [
+        pytest.param(NOUGHT, (), 2, lab.N, id="all 0"),
+        pytest.param(NOUGHT, ((r'<c r="[A-Z]+\d+"', "<c"),), 2, lab.N, id="without places"),
+        pytest.param(NOUGHT, STRICT[:1], 2, lab.N, id="strict"),
+        pytest.param([*GIVEN[:40], *NOUGHT[40:]], (), 42, lab.N - 40, id="some given"),
+    ],
+)
+def test_formulas_with_0_in_a_book_that_is_to_be_worked_out_have_no_value(
+    tmp_path: Path, values: Sequence[str], changes: tuple[Change, ...], row: int, run: int
+) -> None:
+    path = rewritten(with_values(tmp_path, values, marked=True), "xl/(workbook|worksheets/.*).xml", *changes)
+    why = lab.refusal(path)
+    assert f"row {row}, column '{lab.NAMES[2]}' holds a formula without its value (a run of {run} rows)" in why
+    assert "open the workbook in Excel or LibreOffice, which works formulas out, and save it there" in why
+
+
+@pytest.mark.parametrize("marked", [True, False])
+def test_formulas_with_values_count(tmp_path: Path, marked: bool) -> None:
+    (trial,) = lab.trials(with_values(tmp_path, GIVEN, marked))
+    lab.same(trial)
+    assert "formula" not in lab.told(trial)
+
+
+def test_0_by_a_formula_that_was_worked_out_is_0_and_a_column_of_them_is_told(tmp_path: Path) -> None:
+    force = lab.FORCE_MN.copy()
+    force[40:] = 0.0
+    (trial,) = lab.trials(with_values(tmp_path / "a", [*GIVEN[:40], *NOUGHT[40:]], marked=False))
+    lab.same(trial, force_mn=force)
+    assert "have the value 0" not in lab.told(trial)
+    (trial,) = lab.trials(with_values(tmp_path / "b", NOUGHT, marked=False))
+    lab.same(trial, force_mn=0.0 * force)
+    assert f"all {lab.N} formulas of column '{lab.NAMES[2]}' have the value 0; if that is wrong, open" in lab.told(
+        trial
+    )
+
+
+def test_cells_that_an_array_formula_fills_have_no_value_either(tmp_path: Path) -> None:
+    path = book(tmp_path, run=[lab.NAMES, *([t, length, 0] for t, length, _ in ROWS)])
+    first = (r'<c r="C2" t="n"><v>', f'<c r="C2" t="n"><f t="array" ref="C2:C{lab.N + 1}">E2:E9*2</f><v>')
+    why = lab.refusal(rewritten(path, "xl/worksheets/.*", first))
+    assert f"row 2, column '{lab.NAMES[2]}' holds a formula without its value (a run of {lab.N} rows)" in why
+
+
+def test_a_formula_that_gives_empty_text_is_a_blank(tmp_path: Path) -> None:
+    path = with_values(tmp_path, [*GIVEN[:7], "<v></v>", *GIVEN[8:]], marked=False)
+    rewritten(path, "xl/worksheets/.*", (r'<c r="C9"( t="\w+")?>', '<c r="C9" t="str">'))
+    assert "1 blank sample was filled" in lab.told(lab.trials(path)[0])
+
+
+@pytest.mark.parametrize(
+    ("head", "told"), [("length (%L0)", "5 % is read as 5"), ("length (L0)", "5 % is read as 0.05")]
+)
+def test_percent_of_opendocument(tmp_path: Path, head: str, told: str) -> None:
+    """Rows and cells that stand there several times count as often."""
+    path = tmp_path / "t.ods"
+    _ods(
+        path, [["rig 3"], *[[""]] * 3, ["time_s", "", "", head], *([t, "", "", length / 1.2] for t, length, _ in ROWS)]
+    )
+    empty = "<table:table-cell/>"
+    rewritten(
+        path,
+        "content.xml",
+        (rf"(<table:table-row>{empty}</table:table-row>){{3}}",
+         f'<table:table-row table:number-rows-repeated="3">{empty}</table:table-row>'),
+        (rf"({empty}){{2}}", '<table:table-cell table:number-columns-repeated="2"/>'),
+        (r'"float"( office:value="[\d.e-]+"/></table:table-row>)', r'"percentage"\1'),
+    )  # fmt: skip
+    columns = {"time": {"column": "time_s"}, "length": {"column": head}}
+    (trial,) = lab.trials(path, columns, f0=None, reference_length=None)
+    assert trial.length_change_l0 == pytest.approx(lab.LENGTH_MM / 1.2 - 1.0, abs=1e-12)
+    assert f"cells of column '{head}' show percent" in lab.told(trial)
+    assert told in lab.told(trial)
+
+
+def test_a_formula_of_opendocument_without_a_value_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "t.ods"
+    _ods(path, [lab.NAMES, *ROWS])
+    last = (r"<table:table-cell [^<>]*(/></table:table-row>)", r'<table:table-cell table:formula="of:=[.D2]*2"\1')
+    assert "holds a formula without its value" in lab.refusal(rewritten(path, "content.xml", last))

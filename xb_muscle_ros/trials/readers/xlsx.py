@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,12 @@ from xb_muscle_ros.trials.readers.cells import Cell
 from xb_muscle_ros.trials.readers.encoding import looks_like_text
 from xb_muscle_ros.trials.readers.exports import rate_of
 from xb_muscle_ros.trials.readers.layout import LOOKED_AT, Wanted
-from xb_muscle_ros.trials.readers.making import Head, head_of, locate, make_table
+from xb_muscle_ros.trials.readers.making import head_of, locate, make_table
 from xb_muscle_ros.trials.readers.options import ANY_TABLE, Sheets, TableOptions
 from xb_muscle_ros.trials.readers.rows import CellRows
 from xb_muscle_ros.trials.readers.table import Table
 from xb_muscle_ros.trials.readers.tabular import TableReader
-from xb_muscle_ros.trials.readers.xlsx_cells import percent_columns, with_formulas
+from xb_muscle_ros.trials.readers.xlsx_marks import marks_of, read_marks, with_formulas
 
 
 class XlsxReader(TableReader):
@@ -95,7 +95,8 @@ def _chosen(path: Path, names: Sequence[str], sheets: Sheets | None) -> list[str
 
 def _table(path: Path, name: str, workbook: Any, options: TableOptions) -> Table:
     sheet = workbook.get_sheet_by_name(name)
-    everything = with_formulas(path, name, sheet.to_python(skip_empty_area=False))
+    marks = marks_of(path, name)
+    everything = with_formulas(sheet.to_python(skip_empty_area=False), marks)
     numbers = [i for i, row in enumerate(everything, 1) if any(cell != "" for cell in row)]
     moments = {j for row in everything for j, cell in enumerate(row) if isinstance(cell, datetime.datetime)}
     rows = [_ended([_cell(cell, j in moments) for j, cell in enumerate(everything[i - 1])]) for i in numbers]
@@ -108,23 +109,10 @@ def _table(path: Path, name: str, workbook: Any, options: TableOptions) -> Table
     above = [" ".join(str(cell) for cell in row) for row in rows[: found.header or 0]]
     width = len(head.names)
     rows = [[*row, *[""] * (width - len(row))] for row in rows[found.first :]]
-    lines = list(_percent(where, rows, head, percent_columns(path, name)))
-    body = CellRows(rows, numbers[found.first :])
+    numbers = numbers[found.first :]
+    lines = list(read_marks(where, rows, numbers, head, marks))
+    body = CellRows(rows, numbers)
     return make_table(path, name, head, body, options, rate=rate_of(above)).called("", lines)
-
-
-def _percent(where: str, rows: list[list[Cell]], head: Head, columns: Iterable[int]) -> Iterator[str]:
-    """Bring columns whose cells show percent to what their unit is, and tell of it."""
-    for j in sorted(j for j in columns if j < len(head.names)):
-        shown = f"{where}: cells of column '{head.names[j]}' show percent"
-        if "%" not in head.names[j] and not (head.units and "%" in head.units[j]):
-            yield f"{shown}, and have no % in the header: 5 % is read as 0.05"
-            continue
-        for row in rows:
-            cell = row[j]
-            if not isinstance(cell, str):
-                row[j] = float(f"{100.0 * cell:.15g}")
-        yield f"{shown}, as its header says: 5 % is read as 5"
 
 
 def _check(table: Table, wanted: Wanted) -> None:
