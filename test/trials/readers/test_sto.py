@@ -33,12 +33,13 @@ def sto(
     end: str = "\n",
     told: dict[str, str] | None = None,
     scale: float = 1.0,
+    force: float = 1.0,
 ) -> Path:
     """A file as OpenSim writes them; ``told`` changes the header, 'None' takes a line out."""
     facts = {"version": "3", "OpenSimVersion": "4.5", "inDegrees": "no", "nRows": str(COUNT), "nColumns": "3"}
     lines = ["forces", *(f"{key}={value}" for key, value in {**facts, **(told or {})}.items() if value != "None")]
     lines += ["endheader", "\t".join(names)]
-    columns = zip(TIME_S, LENGTH_M, FORCE_N, strict=True)
+    columns = zip(TIME_S, LENGTH_M, force * FORCE_N, strict=True)
     lines += [gap.join((f"{t:.8f}", f"{scale * x:.10f}", f"{f:.8f}")) for t, x, f in columns]
     path.write_bytes(end.join([*lines, ""]).encode())
     return path
@@ -181,3 +182,59 @@ def test_a_mapping_that_reads_a_share_of_l0_in_m_is_told(tmp_path: Path, name: s
     assert READERS["sto"].contents(file).signals[1].unit == "L0"
     trial = read(file, columns={"length": {"column": name, "unit": "m"}}, f0=None)
     assert f"column '{name}' is read in m, but its name tells a share of L0" in trial.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("names", "f0", "newtons"),
+    [
+        (("time", "length_m", "force_mN"), "100 mN", 0.03),
+        (("time", "length_m", "force (g)"), "1 N", 0.03 * 9.80665),
+        (("time", "length (m)", "force (kPa)"), "100 kPa", 0.3),
+        (("time", "length", "force (%F0)"), None, 0.3),
+    ],
+)
+def test_the_unit_in_a_name_is_the_columns(
+    tmp_path: Path, names: tuple[str, ...], f0: str | None, newtons: float
+) -> None:
+    """Regression: mN, kPa and %F0 of a name were read as N without a line."""
+    file = sto(tmp_path / "a.sto", names=names, force=0.1)
+    columns: dict[str, Any] = {"length": {"column": names[1]}, "force": {"column": names[2]}}
+    trial = read(file, columns=columns, f0=f0)
+    assert trial.force_n[0] == pytest.approx(newtons)
+    assert trial.length_m == pytest.approx(LENGTH_M)
+    (line,) = trial.warnings
+    assert f"column '{names[2]}' is read in " in line
+    assert line.endswith("as its name says, in place of N")
+
+
+def test_a_name_tells_the_unit_of_length_and_time(tmp_path: Path) -> None:
+    file = sto(tmp_path / "a.sto", names=("time_ms", "length_cm", "force"), scale=100.0)
+    columns: dict[str, Any] = {"time": {"column": "time_ms"}, "length": {"column": "length_cm"}}
+    with pytest.raises(UserError, match="is ms its unit"):
+        read(file, columns=columns, f0=None)
+    columns["time"]["unit"] = "s"
+    trial = read(file, columns=columns, f0=None)
+    assert (trial.length_m, trial.time_s) == (pytest.approx(LENGTH_M), pytest.approx(TIME_S, abs=1e-9))
+    time, length = sorted(trial.warnings, reverse=True)
+    assert "column 'time_ms' is read in s, but its name tells ms; check columns.time.unit (--time-unit)" in time
+    assert "column 'length_cm' is read in cm, as its name says, in place of m" in length
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "line"),
+    [
+        ("force_mN", "N", "is read in N, but its name tells mN; check columns.force.unit (--force-unit)"),
+        ("force (lbf)", None, "is read in N; 'lbf' in its name is no known unit of force; check columns.force.unit"),
+        ("force_N", None, ""),
+        ("force (lbf)", "N", ""),
+        ("force_mN", "mN", ""),
+    ],
+)
+def test_a_unit_of_the_mapping_that_the_name_belies_is_told(
+    tmp_path: Path, name: str, unit: str | None, line: str
+) -> None:
+    file = sto(tmp_path / "a.sto", names=(*NAMES[:2], name))
+    force = {"column": name} if unit is None else {"column": name, "unit": unit}
+    trial = read(file, columns={"length": {"column": NAMES[1]}, "force": force})
+    assert trial.force_n == pytest.approx(FORCE_N * (1e-3 if unit == "mN" else 1.0), abs=1e-8)
+    assert [line in each for each in trial.warnings if "its name" in each] == ([True] if line else [])

@@ -2,8 +2,9 @@
 
 Header lines are ``key=value`` (``nRows``, ``nColumns``, ``inDegrees``, ...; ``datarows`` and ``datacolumns`` in older
 motion files) up to ``endheader``; then come the names of the columns, ``time`` among them, and the rows. Times are in
-s, lengths in m, forces in N, as everywhere in OpenSim; what is normalised by its name (``normalized_fiber_length``,
-``active_fiber_force_multiplier``) is relative to optimal fibre length or maximal isometric force, which are L0 and F0.
+s, lengths in m, forces in N, as everywhere in OpenSim, unless the name of a column has a unit (``force_mN``); what is
+normalised by its name (``normalized_fiber_length``, ``active_fiber_force_multiplier``) is relative to optimal fibre
+length or maximal isometric force, which are L0 and F0.
 """
 
 from __future__ import annotations
@@ -14,18 +15,18 @@ from pathlib import Path
 from typing import Any
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.inspecting.words import read_name
+from xb_muscle_ros.trials.inspecting.words import fitting, read_name
 from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording
 from xb_muscle_ros.trials.readers.contents import Contents
-from xb_muscle_ros.trials.readers.description import ImportMapping, filled
+from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled
 from xb_muscle_ros.trials.readers.lines import Rows, Text, amount, read_lines, read_rows
 from xb_muscle_ros.trials.readers.named_columns import NamedColumn, contents_of, signals_of
-from xb_muscle_ros.trials.readers.units import calibration, volts_of
+from xb_muscle_ros.trials.readers.units import UNITS, calibration, volts_of
 
 _NEEDED = "a storage file of OpenSim"
 _END = "endheader"
 # An import takes these where the mapping tells no others.
-_UNITS = {"length": "m", "force": "N"}
+_UNITS = {"time": "s", "length": "m", "force": "N"}
 _NORMALISED = {"length": "L0", "force": "F0"}
 _ROWS, _COLUMNS = ("nrows", "datarows"), ("ncolumns", "datacolumns")
 
@@ -93,17 +94,18 @@ class StoReader(Reader):
     suffixes = (".sto", ".mot")
     defaults: Mapping[str, Any] = {
         "fibre": "{file}",
-        "columns": {"time": {"column": "time", "unit": "s"}, "length": {"unit": _UNITS["length"]}},
+        "columns": {"time": {"column": "time", "unit": _UNITS["time"]}, "length": {"unit": _UNITS["length"]}},
     }
     takes = ("decimal",)
 
     def defaults_for(self, told: Mapping[str, Any]) -> Mapping[str, Any]:
-        """With the units of the columns that the mapping names; that of force where it names one."""
+        """With units by the names of the columns that the mapping names; that of force where it names one."""
         columns = told.get("columns")
         named = columns if isinstance(columns, Mapping) else {}
-        roles = ["length", *(["force"] if named.get("force") is not None else [])]
-        units = {role: {"unit": _unit_of(role, named.get(role))} for role in roles}
-        return {**self.defaults, "columns": {**self.defaults["columns"], **units}}
+        roles = ["time", "length", *(["force"] if named.get("force") is not None else [])]
+        own: Mapping[str, Any] = self.defaults["columns"]
+        units = {role: {**own.get(role, {}), "unit": _unit_of(role, named.get(role))} for role in roles}
+        return {**self.defaults, "columns": {**own, **units}}
 
     def trials(self, path: Path, mapping: ImportMapping) -> Iterator[Pending]:
         """The one trial of the file."""
@@ -125,17 +127,19 @@ class StoReader(Reader):
 def _unit(name: str) -> str:
     """The unit of a column that its name does not tell."""
     named = read_name(name)
-    roles = [role for role in named.roles if role in _UNITS]
+    roles = [role for role in named.roles if role in _NORMALISED]
     return _own_unit(roles[0], name) if len(roles) == 1 and not named.unit else ""
 
 
 def _own_unit(role: str, name: str) -> str:
-    return (_NORMALISED if read_name(name).is_normalised else _UNITS)[role]
+    """The unit of OpenSim for a column."""
+    return _NORMALISED[role] if role in _NORMALISED and read_name(name).is_normalised else _UNITS[role]
 
 
 def _unit_of(role: str, spec: object) -> str:
-    """The unit of a signal by the column that a mapping names for it."""
-    return _own_unit(role, str(spec.get("column", "")) if isinstance(spec, Mapping) else "")
+    """The unit of a signal by the column that a mapping names for it: that in its name, or else OpenSim's."""
+    name = str(spec.get("column", "")) if isinstance(spec, Mapping) else ""
+    return fitting(read_name(name).unit, role) or _own_unit(role, name)
 
 
 def _recording(path: Path, mapping: ImportMapping) -> Recording:
@@ -159,9 +163,11 @@ def _recording(path: Path, mapping: ImportMapping) -> Recording:
 
 
 def _doubts(path: Path, mapping: ImportMapping) -> Iterator[str]:
-    """Lines on columns whose names tell volts or no unit at all, which are read in something else."""
+    """Lines on columns that are read in the unit of their name, or in another than that tells."""
     for key, column in mapping.columns.items():
         named = read_name(column.name)
+        if key in _UNITS and named.unit and not volts_of(named.unit, key):
+            yield from _unit_doubts(path, key, column, f"columns.{key}.unit" in mapping.own_keys)
         if named.is_normalised and key in _NORMALISED and column.unit.kind in ("length", "force"):
             yield (
                 f"{path}: column '{column.name}' is read in {column.unit_name}, but its name tells a share of "
@@ -173,6 +179,19 @@ def _doubts(path: Path, mapping: ImportMapping) -> Iterator[str]:
                 f"{path}: column '{column.name}' is read in {column.unit_name}, but its name tells {volts}; by "
                 f"columns.{key}.unit (--{key}-unit) give {calibration(key, volts)}"
             )
+
+
+def _unit_doubts(path: Path, key: str, column: Column, is_given: bool) -> Iterator[str]:
+    """Lines on a column whose name has a unit; one that is OpenSim's own goes without saying."""
+    unit = read_name(column.name).unit
+    told = fitting(unit, key)
+    read = f"{path}: column '{column.name}' is read in {column.unit_name}"
+    if not told and not is_given:
+        yield f"{read}; '{unit}' in its name is no known unit of {key}; check columns.{key}.unit (--{key}-unit)"
+    elif told and UNITS[told] != column.unit:
+        yield f"{read}, but its name tells {told}; check columns.{key}.unit (--{key}-unit)"
+    elif told and not is_given and told != _own_unit(key, column.name):
+        yield f"{read}, as its name says, in place of {_own_unit(key, column.name)}"
 
 
 def _of_rows(header: StoHeader, rows: Rows) -> tuple[str, ...]:
