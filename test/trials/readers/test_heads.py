@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import lab_tables as lab
+import numpy as np
 import pytest
 
 from xb_muscle_ros.errors import UserError
@@ -164,6 +165,62 @@ def test_the_rate_of_the_preamble_stands_for_a_column_of_time(tmp_path: Path, li
     assert "there are 1000 samples in a second by" in lab.told(trial)
 
 
+OTHER_RATES = [["# Sampling rate: 2000 Hz"], ["Rig 3", "Sample interval (ms),0.5"]]
+
+
+@pytest.mark.parametrize("above", OTHER_RATES)
+def test_a_column_of_time_of_another_rate_is_not_passed_over(tmp_path: Path, above: list[str]) -> None:
+    """Regression: the head's rate was taken without a word beside a column of time that told another."""
+    path = lab.write(tmp_path, [*above, "Time (s),length_mm,force_mN", *lab.rows()])
+    columns = {key: spec for key, spec in lab.COLUMNS.items() if key != "time"}
+    why = lab.refusal(path, columns)
+    assert "there are 2000 samples in a second by '" in why
+    remedy = "tell which is right by --time-column 'Time (s)' --time-unit s, or by --rate '2000 Hz'"
+    assert f"', 1000 by column 'Time (s)'; {remedy}" in why
+
+
+@pytest.mark.parametrize(
+    ("time", "rate_hz", "line"),
+    [
+        (
+            {"column": "Time (s)", "unit": "s"},
+            1000.0,
+            "the header says 2000 Hz, the time column 1000 Hz; the time column is used",
+        ),
+        (
+            {"rate": "1000 Hz"},
+            1000.0,
+            "there are 2000 samples in a second by '# Sampling rate: 2000 Hz', 1000 are taken",
+        ),
+        ({"rate": "2000 Hz"}, 2000.0, ""),
+    ],
+)
+def test_what_a_mapping_tells_of_time_goes_before_the_rate_above(
+    tmp_path: Path, time: dict[str, str], rate_hz: float, line: str
+) -> None:
+    path = lab.write(tmp_path, [*OTHER_RATES[0], "Time (s),length_mm,force_mN", *lab.rows()])
+    (trial,) = lab.trials(path, {**lab.COLUMNS, "time": time})
+    lab.same(trial, time_s=lab.TIME_S * 1000.0 / rate_hz)
+    assert [line in each for each in trial.warnings if "2000" in each] == ([True] if line else [])
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("Time (s)", lab.TIME_S),
+        ("time_ms", lab.TIME_S.round(2) * 1000.0),  # ten samples share a time
+        ("Time", 7.0 * lab.TIME_S),  # in a unit that is not told
+        ("Time to peak (s)", 0.0 * lab.TIME_S + 0.3),
+        ("Length time (s)", 7.0 * lab.TIME_S),
+    ],
+)
+def test_columns_that_do_not_contradict_the_rate_above_leave_it(tmp_path: Path, name: str, values: np.ndarray) -> None:
+    rows = lab.rows(values, lab.LENGTH_MM, lab.FORCE_MN)
+    path = lab.write(tmp_path, ["# Sampling rate: 1000 Hz", f"{name},length_mm,force_mN", *rows])
+    (trial,) = lab.trials(path, {key: spec for key, spec in lab.COLUMNS.items() if key != "time"})
+    lab.same(trial)
+
+
 def test_without_time_and_rate_the_refusal_names_both(tmp_path: Path) -> None:
     path = lab.write(tmp_path, ["length_mm,force_mN", *lab.rows(lab.LENGTH_MM, lab.FORCE_MN)])
     with pytest.raises(UserError, match=r"columns\.time is missing; name the column and its unit, or give its rate"):
@@ -240,6 +297,15 @@ def test_labchart_blocks_are_trials_with_units_and_rate_of_the_head(tmp_path: Pa
         f"{path}: the table has 2 blocks, a trial each",
     )
     assert two.warnings == ()
+
+
+def test_an_interval_of_labchart_that_its_times_belie_is_refused(tmp_path: Path) -> None:
+    columns = {key: spec for key, spec in unitless("", "Length", "Force").items() if key != "time"}
+    path = lab.write(tmp_path, labchart(lab.rows(delimiter="\t"), interval="100 us"), "chart.txt")
+    why = lab.refusal(path, columns)
+    assert "are 10000 samples in a second by 'the head of the LabChart file', 1000 by column 'Time'; tell" in why
+    (trial,) = lab.trials(path, unitless("Time", "Length", "Force"))
+    assert "the header says 10000 Hz, the time column 1000 Hz" in lab.told(trial)
 
 
 def test_labchart_interval_stands_for_time(tmp_path: Path) -> None:

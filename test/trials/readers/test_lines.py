@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.readers.lines import Amount, amount, rate_warning, read_lines, read_rows
+from xb_muscle_ros.trials.readers.lines import Amount, amount, read_lines, read_rows
 
 
 @pytest.mark.parametrize(
@@ -72,12 +72,3 @@ def test_a_comma_that_may_be_of_thousands_has_to_be_told(tmp_path: Path) -> None
     assert read_rows(file, text, 0, ("a", "b"), "comma").values[0, 1] == 1.234
     with pytest.raises(UserError, match="column 'b' holds '1,234'; if that is a decimal comma, give --decimal comma"):
         read_rows(file, text, 0, ("a", "b"), "point")
-
-
-def test_rates_are_compared() -> None:
-    time_s = np.arange(10) / 1000
-    assert rate_warning(Path("a"), 1005.0, time_s) == ()
-    assert rate_warning(Path("a"), None, time_s) == ()
-    assert rate_warning(Path("a"), 1000.0, np.zeros(4)) == ()
-    (line,) = rate_warning(Path("a"), 2000.0, time_s)
-    assert line == "a: the header says 2000 Hz, the time column 1000 Hz; the time column is used"

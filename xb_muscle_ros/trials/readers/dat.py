@@ -22,8 +22,9 @@ from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, begin_
 from xb_muscle_ros.trials.readers.contents import Contents
 from xb_muscle_ros.trials.readers.description import ImportMapping, filled
 from xb_muscle_ros.trials.readers.header import is_told, pca_of, reference_warning, told_keys, with_facts
-from xb_muscle_ros.trials.readers.lines import Amount, Rows, Text, amount, rate_warning, read_lines, read_rows
+from xb_muscle_ros.trials.readers.lines import Amount, Rows, Text, amount, read_lines, read_rows
 from xb_muscle_ros.trials.readers.named_columns import NamedColumn, contents_of, signals_of
+from xb_muscle_ros.trials.readers.rates import rate_warning
 from xb_muscle_ros.trials.readers.units import UNITS
 from xb_muscle_ros.trials.trial import Array
 

@@ -10,6 +10,7 @@ from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.readers.columns import SIGNALS
 from xb_muscle_ros.trials.readers.layout import Wanted
 from xb_muscle_ros.trials.readers.options import wanted
+from xb_muscle_ros.trials.readers.rates import check_times
 from xb_muscle_ros.trials.readers.table import Table
 from xb_muscle_ros.trials.readers.units import calibration, unit_in, volts_of
 
@@ -52,10 +53,12 @@ def told_by(table: Table, tree: Mapping[str, Any]) -> Told:
     """What a table tells of what a mapping leaves out.
 
     Raises:
-        UserError: there is no such column, or its header tells no unit.
+        UserError: there is no such column, or its header tells no unit; or a column of time that is not named tells
+            another rate than stands above the table.
     """
     found = list(_units(table, tree))
     if _lacks_time(tree) and table.rate is not None:
+        check_times(table)
         hz, where = table.rate
         line = f"{table.where}: no column of time is named; there are {hz:.6g} samples in a second by '{where}'"
         found.append(("columns.time.rate", f"{hz!r} Hz", line))

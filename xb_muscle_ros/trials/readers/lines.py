@@ -21,8 +21,6 @@ from xb_muscle_ros.trials.readers.table import decimal_of
 from xb_muscle_ros.trials.trial import Array
 
 _END = re.compile(r"\r\n|\n|\r")
-# A header may name the rate another program was told; then the times in the file are right.
-_SAME_RATE = 0.01
 _AMOUNT = re.compile(r"\s*(?P<value>[+-]?(?:[\d.,]+(?:[eE][+-]?\d+)?|nan|inf))(?:\s+(?P<unit>\S.*))?\s*", re.IGNORECASE)
 
 
@@ -148,14 +146,3 @@ def amount(text: str) -> Amount:
         return Amount(math.nan, text.strip())
     value = match["value"]
     return Amount(number(value, COMMA if "," in value else POINT), (match["unit"] or "").strip())
-
-
-def rate_warning(path: Path, stated_hz: float | None, time_s: Array) -> tuple[str, ...]:
-    """A line where the header's rate is not that of the times, which count."""
-    step_s = float(np.median(np.diff(time_s))) if time_s.size > 1 else 0.0
-    if stated_hz is None or step_s <= 0.0:
-        return ()
-    found_hz = 1.0 / step_s
-    if abs(stated_hz - found_hz) <= _SAME_RATE * found_hz:
-        return ()
-    return (f"{path}: the header says {stated_hz:g} Hz, the time column {found_hz:g} Hz; the time column is used",)

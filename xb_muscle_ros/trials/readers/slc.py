@@ -21,7 +21,8 @@ from xb_muscle_ros.trials.readers.base import Pending, Reader, Recording, Signal
 from xb_muscle_ros.trials.readers.cells import number
 from xb_muscle_ros.trials.readers.contents import Content, Contents
 from xb_muscle_ros.trials.readers.description import Column, ImportMapping, filled, name_of
-from xb_muscle_ros.trials.readers.lines import decoded, numbers, rate_warning
+from xb_muscle_ros.trials.readers.lines import decoded, numbers
+from xb_muscle_ros.trials.readers.rates import rate_warning
 from xb_muscle_ros.trials.readers.rows import SPACES, TextRows
 from xb_muscle_ros.trials.trial import Array
 

@@ -19,6 +19,7 @@ from xb_muscle_ros.trials.readers.length import L0_RANGE_M
 from xb_muscle_ros.trials.readers.options import DEFAULTS, TableOptions, read_options, wanted
 from xb_muscle_ros.trials.readers.parts import Part, parts_of
 from xb_muscle_ros.trials.readers.pca_columns import check_pca
+from xb_muscle_ros.trials.readers.rates import other_rate, rate_warning
 from xb_muscle_ros.trials.readers.table import Table, taken
 from xb_muscle_ros.trials.readers.table_contents import table_contents
 from xb_muscle_ros.trials.readers.tree import Keys
@@ -96,6 +97,7 @@ def _recording(table: Table, mapping: ImportMapping, part: Part, notices: tuple[
             values, filled_in = _values(table, mapping, part, column, time)
             signals[key] = Signal(f"column '{column}'", values, at)
             lines += [f"{where}, column '{column}': {filled_in}"] if filled_in else []
+    lines += _rate_doubts(table, mapping, time)
     facts = {**mapping.facts_of(table.path), **_sheet_facts(table, mapping), **part.facts}
     return Recording(
         where,
@@ -118,6 +120,18 @@ def _time(table: Table, mapping: ImportMapping, part: Part) -> tuple[Array, str]
     first = table.text(column, int(part.rows[0]))
     line = f"column '{column}' holds times of a clock; '{first}' is read as {values[0]:.9g} s"
     return values / mapping.time.unit.factor, line
+
+
+def _rate_doubts(table: Table, mapping: ImportMapping, time: Array) -> tuple[str, ...]:
+    """A line where another rate stands above the table than that of the times."""
+    if table.rate is None:
+        return ()
+    hz, line = table.rate
+    if mapping.rate_hz is None:
+        return rate_warning(table.where, hz, time * mapping.time.unit.factor)
+    if other_rate(hz, time) is None:
+        return ()
+    return (f"{table.where}: there are {hz:g} samples in a second by '{line}', {mapping.rate_hz:g} are taken",)
 
 
 def _values(table: Table, mapping: ImportMapping, part: Part, column: str, time: Array) -> tuple[Array, str]:
