@@ -311,6 +311,10 @@ def _stretches(amplitude: float) -> np.ndarray:
     return 1.0 + np.interp(TIME_S, CORNERS_S, np.array([0.0, 1.0, 0.0, 0.0, 1.0]) * amplitude)
 
 
+def _lone_stretch(amplitude: float) -> np.ndarray:
+    return 1.0 + np.interp(TIME_S, CORNERS_S[3:], [0.0, amplitude])
+
+
 def _artefact(force_f0: float) -> np.ndarray:
     return np.where((TIME_S >= 0.2) & (TIME_S < 0.22), force_f0, QUIET)
 
@@ -333,6 +337,7 @@ def _artefact(force_f0: float) -> np.ndarray:
         (_stretches(0.04), QUIET, {"amplitude_l0": 4.0}, "amplitude_l0 is 4; allowed is 0 to 0.5: amplitudes are frac"),
         (_stretches(0.04), QUIET, {"recovery_s": 0.2}, "recovery_s is 0.2 s, but the recovery at 0.5600 s has 0.1 s"),
         (_stretches(0.0), QUIET, {"amplitude_l0": 0.7}, "amplitude_l0 is 0.7; allowed is 0 to 0.5"),
+        (_lone_stretch(0.04), QUIET, {"amplitude_l0": 0.04, "recovery_s": 0.1}, "show no conditioning stretch from 0"),
     ],
 )
 def test_what_no_command_takes_is_not_imported_and_what_is_imported_is_taken(

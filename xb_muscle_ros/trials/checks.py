@@ -9,6 +9,7 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError, naming
 from xb_muscle_ros.trials.stamps import GAP_STEPS, largest_gap
+from xb_muscle_ros.trials.stated import SHARE, before, least_pause_s, leaves_room_for_stretch
 from xb_muscle_ros.trials.trial import Phase, Trial
 
 # With fewer nothing moves, and nothing can be compared.
@@ -36,10 +37,9 @@ _RELAXED_PCA = 8.0
 _GAP_S = 0.01
 # What length changes by across a gap that can be lived with, L0.
 _ACROSS_L0 = 5e-3
-# Amplitudes are fractions of L0: larger ones are those that the lengths show. Facts are as much as this off what phases
-# have, where these can be seen.
+# Amplitudes are fractions of L0: larger ones are those that the lengths show. Facts are compared with what phases have
+# where either is large enough to be seen.
 _AMPLITUDE_L0 = 0.5
-_PERCENT = 0.25
 _SHORTEST_COMPARED_S, _SMALLEST_COMPARED_L0 = 0.02, 0.01
 
 
@@ -81,7 +81,7 @@ def unusual(trial: Trial, f0_is_known: bool = True, pca_is_known: bool = True) -
     _check_samples(trial)
     _check_calcium(trial)
     lines = [*_length(trial), *_force(trial, f0_is_known), *_median_force(trial, pca_is_known)]
-    lines += [*_gaps(trial), *_cover(trial)]
+    lines += [*_gaps(trial), *_cover(trial), *unrecorded(trial)]
     for fact in belied(trial):
         raise UserError(f"{fact.what}; {fact.remedy}")
     return lines
@@ -181,23 +181,77 @@ def _cover(trial: Trial) -> Iterator[str]:
 
 def belied(trial: Trial) -> Iterator[Belied]:
     """Stated amplitude and recovery that are in another unit, or of another trial than the lengths."""
-    facts = trial.facts
-    amplitude, recovery = facts.amplitude_l0, facts.recovery_s
-    phases = {name: phase for name, phase in trial.phases_by_name().items() if _is_recorded(trial, phase)}
-    stretch, rest = phases.get("conditioning_stretch"), phases.get("recovery")
+    amplitude = trial.facts.amplitude_l0
+    phases = _recorded(trial)
+    stretch = phases.get("conditioning_stretch")
     shown = None if stretch is None else _amplitude(trial, stretch)
     if amplitude is not None and not 0.0 <= amplitude <= _AMPLITUDE_L0 and (shown is None or _apart(shown, amplitude)):
         allowed = f"allowed is 0 to {_AMPLITUDE_L0:g}: amplitudes are fractions of L0, not percent"
         yield Belied("amplitude_l0", f"amplitude_l0 is {amplitude:g}", allowed)
-    elif amplitude is not None and stretch is not None and shown is not None and amplitude >= _SMALLEST_COMPARED_L0:
-        yield from _compared(shown, amplitude, "amplitude_l0", "L0", stretch)
-    if recovery is not None and rest is not None and rest.end_s - rest.start_s >= _SHORTEST_COMPARED_S:
+    elif amplitude is not None and stretch is not None and shown is not None:
+        if max(amplitude, shown) >= _SMALLEST_COMPARED_L0:
+            yield from _compared(shown, amplitude, "amplitude_l0", "L0", stretch)
+    elif amplitude is not None:
+        yield from _missing(trial, amplitude)
+    yield from _recovery(trial, phases)
+
+
+def unrecorded(trial: Trial) -> Iterator[str]:
+    """A line on a stated amplitude of which the lengths show nothing, where no recovery tells whether they could."""
+    facts, test = trial.facts, _recorded(trial).get("test_stretch")
+    amplitude = facts.amplitude_l0
+    if amplitude is None or amplitude < _SMALLEST_COMPARED_L0 or facts.recovery_s is not None:
+        return
+    if test is not None and "conditioning_stretch" not in trial.phases_by_name():
+        yield (
+            f"amplitude_l0 is {amplitude:g} L0, but lengths from {trial.time_s[0]:.4g} s show no conditioning stretch "
+            f"before the test stretch at {test.start_s:.4f} s; a trial without one has amplitude 0; where it was made "
+            "before the record began, give the recovery"
+        )
+
+
+def _missing(trial: Trial, amplitude: float) -> Iterator[Belied]:
+    """An amplitude whose stretch would lie within lengths that hold still there."""
+    facts, test = trial.facts, _recorded(trial).get("test_stretch")
+    if test is None or facts.recovery_s is None or amplitude <= 0.0:
+        return
+    if [phase.name for phase in facts.phases[:2]] != ["isometric", "test_stretch"]:
+        return
+    l0 = facts.reference_length_m
+    speed = _amplitude(trial, test) * l0 / (test.end_s - test.start_s)
+    if speed <= 0.0:
+        return
+    stretch = before(test.start_s, speed, amplitude * l0, facts.recovery_s)
+    if stretch.peak_s > trial.time_s[0] and not leaves_room_for_stretch(trial.time_s, trial.length_m, stretch):
+        what = (
+            f"amplitude_l0 is {amplitude:g} L0 and recovery_s {facts.recovery_s:g} s, but lengths show no conditioning "
+            f"stretch from {trial.time_s[0]:.4f} s to the test stretch at {test.start_s:.4f} s"
+        )
+        yield Belied("amplitude_l0", what, "correct them, or give amplitude 0 for a trial without one")
+
+
+def _recovery(trial: Trial, phases: dict[str, Phase]) -> Iterator[Belied]:
+    """A recovery that is not that between shortening and test stretch."""
+    recovery, rest = trial.facts.recovery_s, phases.get("recovery")
+    down, test = phases.get("shortening"), phases.get("test_stretch")
+    if recovery is None:
+        return
+    if rest is not None and max(rest.end_s - rest.start_s, recovery) >= _SHORTEST_COMPARED_S:
         yield from _compared(rest.end_s - rest.start_s, recovery, "recovery_s", "s", rest)
+        return
+    if rest is None and down is not None and test is not None and recovery > least_pause_s(trial.time_s):
+        what = f"recovery_s is {recovery:g} s, but the test stretch at {test.start_s:.4f} s has no pause before it"
+        if down.end_s == test.start_s:
+            yield Belied("recovery_s", what, "correct the one that is wrong")
+
+
+def _recorded(trial: Trial) -> dict[str, Phase]:
+    return {name: phase for name, phase in trial.phases_by_name().items() if _is_recorded(trial, phase)}
 
 
 def _is_recorded(trial: Trial, phase: Phase) -> bool:
-    """Whether lengths cover a phase; a bag that was cut short may end within."""
-    return bool(trial.time_s[0] <= phase.start_s and phase.end_s <= trial.time_s[-1])
+    """Whether lengths cover a phase; a record that begins or ends with it may have a part."""
+    return bool(trial.time_s[0] < phase.start_s and phase.end_s <= trial.time_s[-1])
 
 
 def _amplitude(trial: Trial, stretch: Phase) -> float:
@@ -207,7 +261,7 @@ def _amplitude(trial: Trial, stretch: Phase) -> float:
 
 
 def _apart(found: float, stated: float) -> bool:
-    return abs(found - stated) > _PERCENT * abs(found)
+    return abs(found - stated) > SHARE * abs(found)
 
 
 def _compared(found: float, stated: float, name: str, unit: str, phase: Phase) -> Iterator[Belied]:

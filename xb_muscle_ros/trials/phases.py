@@ -13,6 +13,7 @@ import numpy as np
 
 from xb_muscle_ros.trials.corners import Piece, straight_pieces
 from xb_muscle_ros.trials.runs import RELEASE_L0_PER_S, RELEASE_S
+from xb_muscle_ros.trials.stated import before, leaves_room_for_pause, leaves_room_for_stretch
 from xb_muscle_ros.trials.trial import Array, Phase
 
 _CONDITIONED = (1, -1, 1)
@@ -40,7 +41,8 @@ def detect_phases(
         amplitude_l0: the amplitude of the conditioning stretch where it is known, L0. A stretch too small to be seen
             in the record is then placed by the protocol, counting back from the test stretch at the same speed.
         recovery_s: the time between shortening and test stretch where it is known, s. A pause too short to be seen
-            in the record then gets this duration around the corner in which it hides.
+            in the record then gets this duration around the corner in which it hides. Neither counts where the
+            record would show it and does not.
         l0: the length that is L0, in the unit of length; None for the median of the record.
         servo_give: changes of length up to this that come back are none: the motor gave under the muscle's force.
 
@@ -50,14 +52,15 @@ def detect_phases(
     """
     length = np.asarray(length, dtype=np.float64)
     l0 = float(np.median(length)) if l0 is None else l0
-    pieces = straight_pieces(np.asarray(time_s, dtype=np.float64), length, l0, servo_give)
+    time_s = np.asarray(time_s, dtype=np.float64)
+    pieces = straight_pieces(time_s, length, l0, servo_give)
     ramps = tuple(piece.direction for piece in pieces if piece.direction)
     if ramps == _CONDITIONED and all(piece.direction for piece in _between(pieces)):
-        return _named(_with_pause(pieces, recovery_s), _CONDITIONED_NAMES)
+        return _named(_with_pause(time_s, length, pieces, recovery_s), _CONDITIONED_NAMES)
     if ramps == _CONDITIONED and len(_between(pieces)) == 2 and _between(pieces)[1].direction == 0:
         return _named(pieces, _CONDITIONED_NAMES)
     if amplitude_l0 and recovery_s and ramps and ramps[-1] > 0 and pieces[0].direction == 0:
-        placed = _placed_by_protocol(pieces, amplitude_l0, recovery_s)
+        placed = _placed_by_protocol(time_s, length, pieces, amplitude_l0, recovery_s)
         if placed is not None:
             return _named(placed, _CONDITIONED_NAMES)
     if ramps == _REFERENCE:
@@ -136,15 +139,15 @@ def _between(pieces: list[Piece]) -> list[Piece]:
     return pieces[ramps[0] + 1 : ramps[-1]]
 
 
-def _with_pause(pieces: list[Piece], recovery_s: float | None) -> list[Piece]:
-    """Put a pause of known duration around the corner between shortening and test stretch.
+def _with_pause(time_s: Array, length: Array, pieces: list[Piece], recovery_s: float | None) -> list[Piece]:
+    """Put a pause of known duration around the corner between shortening and test stretch, where it may hide.
 
     Lines of equal and opposite slope that stop at a level and leave it again meet in the middle of the pause.
     """
-    if not recovery_s:
-        return pieces
     i = next(i for i, piece in enumerate(pieces) if piece.direction < 0)
     down, up = pieces[i], pieces[i + 1]
+    if not recovery_s or not leaves_room_for_pause(time_s, length, down, up, recovery_s):
+        return pieces
     half = min(0.5 * recovery_s, 0.9 * (down.end_s - down.start_s), 0.9 * (up.end_s - up.start_s))
     start_s, end_s = down.end_s - half, down.end_s + half
     level = down.line[0] * start_s + down.line[1]
@@ -152,15 +155,20 @@ def _with_pause(pieces: list[Piece], recovery_s: float | None) -> list[Piece]:
     return [*pieces[:i], down._replace(end_s=start_s), pause, up._replace(start_s=end_s), *pieces[i + 2 :]]
 
 
-def _placed_by_protocol(pieces: list[Piece], amplitude_l0: float, recovery_s: float) -> list[Piece] | None:
-    """The protocol's pieces counted back from the test stretch; None where the record begins too late for them."""
+def _placed_by_protocol(
+    time_s: Array, length: Array, pieces: list[Piece], amplitude_l0: float, recovery_s: float
+) -> list[Piece] | None:
+    """The protocol's pieces counted back from the test stretch.
+
+    Returns:
+        None where the record begins too late for them, or would show them and does not.
+    """
     i = max(i for i, piece in enumerate(pieces) if piece.direction)
     test, first = pieces[i], pieces[0]
-    ramp_s = amplitude_l0 * first.line[1] / test.line[0]
-    down_end_s = test.start_s - recovery_s
-    peak_s = down_end_s - ramp_s
-    onset_s = peak_s - ramp_s
-    if onset_s <= first.start_s:
+    stretch = before(test.start_s, test.line[0], amplitude_l0 * first.line[1], recovery_s)
+    onset_s, down_end_s = stretch.onset_s, test.start_s - recovery_s
+    peak_s = down_end_s - stretch.ramp_s
+    if onset_s <= first.start_s or not leaves_room_for_stretch(time_s, length, stretch):
         return None
     slope = test.line[0]
     return [

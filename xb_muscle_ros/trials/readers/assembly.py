@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from xb_muscle_ros.errors import UserError, naming
-from xb_muscle_ros.trials.checks import belied, unusual
+from xb_muscle_ros.trials.checks import belied, unrecorded, unusual
 from xb_muscle_ros.trials.inspecting.names import name_pattern
 from xb_muscle_ros.trials.mains import hum_line, notched
 from xb_muscle_ros.trials.phases import conditioning
@@ -105,6 +105,8 @@ def made_of(recording: Recording, mapping: ImportMapping, path: Path, isometric_
         force_n=settle(force.force_n),
     )
     trial = _with_shown_facts(draft, trial, path, {"amplitude_l0": amplitude_l0, "recovery_s": recovery_s})
+    for line in unrecorded(trial):
+        draft.warn(line)
     if mapping.notch_hz:
         with naming(draft.where):
             trial = notched(trial, mapping.notch_hz)
