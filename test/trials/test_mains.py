@@ -10,7 +10,7 @@ import pytest
 
 import xb_muscle_ros as xb
 from xb_muscle_ros.errors import UserError
-from xb_muscle_ros.trials.mains import hum_line, hum_of_mains, notched
+from xb_muscle_ros.trials.mains import hum_line, hum_of_mains, laid_notch
 from xb_muscle_ros.trials.trial import Trial
 
 
@@ -20,6 +20,16 @@ def recorded(hz: float = 50.0, amplitude: float = 0.0, rate: float = 1000.0, lea
     hum = amplitude * np.sin(2.0 * np.pi * hz * trial.time_s + 0.7)
     force = 0.5 + 8.0 * trial.length_change_l0 + hum + noise
     return replace(trial, force_time_s=trial.time_s, force_n=force)
+
+
+def notched(trial: Trial, frequencies_hz: list[float]) -> Trial:
+    notch = laid_notch(frequencies_hz, trial.force_time_s, trial.force_n)
+    return replace(
+        trial,
+        length_m=notch.without("length", trial.time_s, trial.length_m),
+        force_n=notch.without("force", trial.force_time_s, trial.force_n),
+        facts=replace(trial.facts, source=notch.note),
+    )
 
 
 @pytest.mark.parametrize("hz", [49.9, 50.0, 50.1, 60.0])
@@ -108,33 +118,57 @@ def test_a_short_record_is_refused() -> None:
         notched(trial, [50.0])
 
 
+OPTIONS = ["--fiber", "soleus", "--pca", "6.1", "--time-column", "time_s", "--time-unit", "s", "--f0", "20 mN"]
+OPTIONS += ["--length-column", "length_mm", "--length-unit", "mm", "--force-column", "force_mN", "--force-unit", "mN"]
+
+
+def table(file: Path, trial: Trial) -> str:
+    """The name of a table of a trial, with L0 = 30 mm."""
+    rows = np.column_stack([trial.time_s, 30.0 * (1.0 + trial.length_change_l0), 20.0 * trial.force_n])
+    np.savetxt(file, rows, delimiter=",", header="time_s,length_mm,force_mN", comments="")
+    return str(file)
+
+
+def test_l0_and_phases_are_those_of_the_length_without_its_hum(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from xb_muscle_ros.cli.main import main
+
+    trial = recorded(50.0, 0.02)
+    hum = 3e-3 * np.sin(2.0 * np.pi * 50.0 * trial.time_s)
+    file = table(tmp_path / "ramp.csv", replace(trial, length_m=trial.length_m + hum))
+    assert main(["import", file, *OPTIONS, "--out", str(tmp_path / "a")]) == 0
+    assert "hides its first change, so L0 is the mean of the whole record, 0.030" in capsys.readouterr().out
+    (hidden,) = xb.read_trials(tmp_path / "a", tell=lambda line: None)
+    assert "mean before the first change" not in hidden.facts.source
+    assert "(mean of the whole record, as noise, hum or an oscillation hides" in hidden.facts.source
+    assert main(["import", file, *OPTIONS, "--notch", "50", "--out", str(tmp_path / "b")]) == 0
+    assert "hides" not in capsys.readouterr().out
+    (found,) = xb.read_trials(tmp_path / "b", tell=lambda line: None)
+    assert found.facts.reference_length_m == pytest.approx(0.03, rel=1e-4)
+    assert "(mean before the first change of length)" in found.facts.source
+    assert [phase.name for phase in found.facts.phases] == [phase.name for phase in trial.facts.phases]
+    for phase, made in zip(found.facts.phases, trial.facts.phases, strict=True):
+        assert phase.start_s == pytest.approx(made.start_s, abs=1e-3)
+    assert found.facts.amplitude_l0 == pytest.approx(0.0383, abs=3e-4)
+
+
 def test_import_tells_of_hum_and_takes_it_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from xb_muscle_ros.cli.main import main
 
     trial = recorded(50.02, 0.02)
-    table = np.column_stack([trial.time_s, 30.0 * (1.0 + trial.length_change_l0), 20.0 * trial.force_n])
-    file = tmp_path / "ramp.csv"
-    np.savetxt(file, table, delimiter=",", header="time_s,length_mm,force_mN", comments="")
-    options = ["--fiber", "soleus", "--pca", "6.1", "--time-column", "time_s", "--time-unit", "s", "--f0", "20 mN"]
-    options += [
-        "--length-column",
-        "length_mm",
-        "--length-unit",
-        "mm",
-        "--force-column",
-        "force_mN",
-        "--force-unit",
-        "mN",
-    ]
-    assert main(["import", str(file), *options, "--out", str(tmp_path / "a")]) == 0
+    file = table(tmp_path / "ramp.csv", trial)
+    assert main(["import", file, *OPTIONS, "--out", str(tmp_path / "a")]) == 0
     assert "force has hum of 50.0 Hz with an amplitude of 2 % F0; --notch 50" in capsys.readouterr().out
-    assert main(["import", str(file), *options, "--notch", "50", "--out", str(tmp_path / "b")]) == 0
+    assert main(["import", file, *OPTIONS, "--notch", "50", "--out", str(tmp_path / "b")]) == 0
     assert "has hum" not in capsys.readouterr().out
     (before,) = xb.read_trials(tmp_path / "a", tell=lambda line: None)
     (after,) = xb.read_trials(tmp_path / "b", tell=lambda line: None)
     assert "notch at 50 Hz" in after.facts.source
-    assert after.facts.phases == before.facts.phases
+    assert [phase.name for phase in after.facts.phases] == [phase.name for phase in before.facts.phases]
+    for found, clean in zip(after.facts.phases, before.facts.phases, strict=True):
+        assert found.start_s == pytest.approx(clean.start_s, abs=1e-3)
     still = after.time_s < 1.2
     assert np.std(after.measured_f0[still]) < 0.1 * np.std(before.measured_f0[still])
-    assert main(["import", str(file), *options, "--notch", "5000", "--out", str(tmp_path / "c")]) == 2
+    assert main(["import", file, *OPTIONS, "--notch", "5000", "--out", str(tmp_path / "c")]) == 2
     assert "notch is 5000 Hz; allowed is 1 to 1000" in capsys.readouterr().err

@@ -12,8 +12,8 @@ import numpy as np
 
 from xb_muscle_ros.errors import UserError
 from xb_muscle_ros.trials.bag_reading import Reading
-from xb_muscle_ros.trials.phases import conditioning, detect_phases, initial_isometric
-from xb_muscle_ros.trials.trial import Array, Trial
+from xb_muscle_ros.trials.phases import conditioning, detect_phases, initial_isometric, moves
+from xb_muscle_ros.trials.trial import Trial
 
 # Digits of a pCa that is taken from calcium: 10^(6 - pCa) does not come back to the last bit.
 _PCA_DIGITS = 6
@@ -21,8 +21,6 @@ CONDITIONING_FOUND = "amplitude and recovery found from length"
 _PHASES = "phases found from length"
 _CUT = "phases of the bag go on after its lengths end; of those the scores have a part, or none"
 _OTHER_CLOCK = "phases of the bag lie at other times than its lengths and are left out"
-# A record moves where means of so many parts differ by this share of length, and by so many of their standard errors.
-_PARTS, _LEAST_MOVE, _ERRORS = 20, 3e-3, 8.0
 
 
 class FibreConstants(Protocol):
@@ -91,7 +89,7 @@ def complete(reading: Reading, known: Known) -> tuple[Trial, tuple[str, ...]]:
         facts, l0 = trial.facts, _length_for_phases(trial, unknown, known)
         phases = detect_phases(trial.time_s, trial.length_m, facts.amplitude_l0, facts.recovery_s, l0)
         trial = replace(trial, facts=replace(facts, phases=phases))
-        hidden = [phase.name for phase in trial.facts.phases] == ["isometric"] and _moves(trial.length_m)
+        hidden = [phase.name for phase in trial.facts.phases] == ["isometric"] and moves(trial.length_m)
         notes.append("no phases found, though length moves: its noise hides them" if hidden else _PHASES)
     trial, told = _with_scales(trial, unknown, known)
     notes += told
@@ -139,15 +137,6 @@ def _cut(trial: Trial) -> bool:
     steps = np.diff(trial.time_s)
     end_s = max((phase.end_s for phase in trial.facts.phases), default=-np.inf)
     return bool(end_s > trial.time_s[-1] + 2.0 * (float(np.median(steps)) if steps.size else 0.0))
-
-
-def _moves(length_m: Array) -> bool:
-    """Whether length changes, slowly or under noise: means of stretches of the record differ beyond their errors."""
-    parts = np.array_split(length_m, min(_PARTS, max(length_m.size // 4, 1)))
-    means = np.array([float(np.mean(part)) for part in parts])
-    errors = np.array([float(np.std(part)) / np.sqrt(part.size) for part in parts])
-    least = max(_LEAST_MOVE * float(np.median(length_m)), _ERRORS * float(np.median(errors)))
-    return bool(np.ptp(means) > least)
 
 
 def counted(notes: Iterable[tuple[str, ...]]) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import iirnotch, sosfiltfilt, tf2sos
@@ -78,27 +78,47 @@ def hum_line(trial: Trial, without_hz: Sequence[float] = ()) -> str:
     return f"{line}; --notch {notches} of import takes it out of length and force"
 
 
-def notched(trial: Trial, frequencies_hz: Sequence[float]) -> Trial:
-    """A trial without some frequencies: length and force go through the same filter, forwards and backwards.
+class Notch(NamedTuple):
+    """Frequencies that are taken out of length and force: both go through the same filter, forwards and backwards.
 
     Each notch is 2 Hz wide (half power), lies where force has most within that width, and shifts nothing in time; a
     corner of length rings at its frequency, in force as in length.
 
-    Args:
-        frequencies_hz: of the notches, each below half the sampling rate.
-
-    Raises:
-        UserError: samples are not even or too few, or a frequency is none that they show.
+    Attributes:
+        asked_hz: frequencies as asked for, Hz.
+        laid_hz: where the notches lie, Hz.
     """
-    found_hz = [_found(trial, hz) for hz in frequencies_hz]
-    length = _filtered("length", trial.time_s, trial.length_m, found_hz)
-    force = trial.force_n
-    if trial.force_time_s.size:
-        force = _filtered("force", trial.force_time_s, trial.force_n, found_hz)
-    asked, laid = (", ".join(f"{hz:.4g}" for hz in each) for each in (frequencies_hz, found_hz))
-    told = f"notch at {asked} Hz, {WIDTH_HZ:g} Hz wide, on length and force" + f" (laid at {laid} Hz)" * (laid != asked)
-    source = "; ".join(filter(None, [trial.facts.source, told]))
-    return replace(trial, length_m=length, force_n=force, facts=replace(trial.facts, source=source))
+
+    asked_hz: tuple[float, ...] = ()
+    laid_hz: tuple[float, ...] = ()
+
+    def without(self, what: str, time_s: Array, values: Array) -> Array:
+        """Values without the frequencies, shape (n,).
+
+        Args:
+            what: their name, for messages.
+            time_s, values: shape (n,), s and any unit.
+
+        Raises:
+            UserError: samples are not even or too few, or a frequency is none that they show.
+        """
+        if not (self.laid_hz and values.size):
+            return values
+        return _filtered(what, time_s, values, self.laid_hz)
+
+    @property
+    def note(self) -> str:
+        """What was done, for a trial's source; empty where nothing was."""
+        if not self.laid_hz:
+            return ""
+        asked, laid = (", ".join(f"{hz:.4g}" for hz in each) for each in self)
+        told = f"notch at {asked} Hz, {WIDTH_HZ:g} Hz wide, on length and force"
+        return told + f" (laid at {laid} Hz)" * (laid != asked)
+
+
+def laid_notch(frequencies_hz: Sequence[float], force_time_s: Array, force: Array) -> Notch:
+    """A notch at each of some frequencies (Hz), where force (shape (n,), any unit; may be empty) has most near it."""
+    return Notch(tuple(frequencies_hz), tuple(_found(force_time_s, force, hz) for hz in frequencies_hz))
 
 
 def check_frequencies(frequencies_hz: Sequence[float], what: str) -> None:
@@ -112,13 +132,13 @@ def check_frequencies(frequencies_hz: Sequence[float], what: str) -> None:
             raise UserError(f"{what} is {hz:g} Hz; allowed is 1 to {_HIGHEST_HZ:g}, for example 50")
 
 
-def _found(trial: Trial, hz: float) -> float:
+def _found(force_time_s: Array, force: Array, hz: float) -> float:
     """Where hum lies within a notch: mains of 50 Hz may have 49.8."""
-    middle = slice(max((trial.force_n.size - _MOST_SOUGHT) // 2, 0), (trial.force_n.size + _MOST_SOUGHT) // 2)
-    time_s = trial.force_time_s[middle]
+    middle = slice(max((force.size - _MOST_SOUGHT) // 2, 0), (force.size + _MOST_SOUGHT) // 2)
+    time_s = force_time_s[middle]
     if time_s.size < _LEAST or not _even(time_s):
         return hz
-    return line_near(float(time_s[-1] - time_s[0]) / (time_s.size - 1), trial.force_n[middle], hz, 0.5 * WIDTH_HZ)
+    return line_near(float(time_s[-1] - time_s[0]) / (time_s.size - 1), force[middle], hz, 0.5 * WIDTH_HZ)
 
 
 def _fault(what: str, time_s: Array, hz: float) -> str:

@@ -22,6 +22,8 @@ _REFERENCE = (1,)
 # the release).
 _SLACK_S = 0.2
 _BACK = 0.2
+# A record moves where means of so many parts differ by this share of length, and by so many of their standard errors.
+_PARTS, _LEAST_MOVE, _ERRORS = 20, 3e-3, 8.0
 _CONDITIONED_NAMES = ("conditioning_stretch", "shortening", "test_stretch")
 
 
@@ -102,6 +104,15 @@ def initial_isometric(time_s: Array, phases: tuple[Phase, ...]) -> slice:
     first = phases[0]
     end_s = first.end_s if len(phases) == 1 else first.start_s + 0.8 * (first.end_s - first.start_s)
     return slice(0, int(np.searchsorted(time_s, end_s, side="right")))
+
+
+def moves(length_m: Array) -> bool:
+    """Whether length changes, slowly or under noise: means of stretches of the record differ beyond their errors."""
+    parts = np.array_split(length_m, min(_PARTS, max(length_m.size // 4, 1)))
+    means = np.array([float(np.mean(part)) for part in parts])
+    errors = np.array([float(np.std(part)) / np.sqrt(part.size) for part in parts])
+    least = max(_LEAST_MOVE * float(np.median(length_m)), _ERRORS * float(np.median(errors)))
+    return bool(np.ptp(means) > least)
 
 
 def _names(pieces: list[Piece], l0: float) -> list[str]:

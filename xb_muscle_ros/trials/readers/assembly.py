@@ -12,7 +12,7 @@ import numpy as np
 from xb_muscle_ros.errors import UserError, naming
 from xb_muscle_ros.trials.checks import belied, unrecorded, unusual
 from xb_muscle_ros.trials.inspecting.names import name_pattern
-from xb_muscle_ros.trials.mains import hum_line, notched
+from xb_muscle_ros.trials.mains import hum_line, laid_notch
 from xb_muscle_ros.trials.phases import conditioning
 from xb_muscle_ros.trials.readers.base import Draft, Recording, Signal
 from xb_muscle_ros.trials.readers.calcium import PCA_RANGE, SAME_PCA, pcas_in, read_calcium
@@ -67,9 +67,10 @@ def made_of(recording: Recording, mapping: ImportMapping, path: Path, isometric_
     _compare_facts(draft, path)
     clock = read_clock(draft)
     release(recording.signals["time"].values)
-    length = read_length(draft, clock.time_s)
-    calcium = read_calcium(draft, clock)
     force_s = clock.time_s if signal is None else times_of(signal, clock, draft)
+    notch = laid_notch(mapping.notch_hz, force_s, np.empty(0) if signal is None else signal.values)
+    length = read_length(draft, clock.time_s, notch)
+    calcium = read_calcium(draft, clock)
     force = read_force(draft, force_s, length.phases, calcium.pca, isometric_scaling)
     release(*(each.values for each in recording.signals.values()))
     force_f0 = force.force_n / force.f0_n
@@ -82,6 +83,9 @@ def made_of(recording: Recording, mapping: ImportMapping, path: Path, isometric_
     del force_f0
     warn_of_f0(draft, force.f0_n, length.reference_m)
     _check_onset(draft, length)
+    with naming(draft.where):
+        force_n = notch.without("force", force.time_s, force.force_n)
+    draft.notes.append(notch.note)
     amplitude_l0, recovery_s = conditioning(clock.time_s, length.length_m, length.reference_m, length.phases)
     facts = TrialFacts(
         fibre=filled(mapping.fibre, path),
@@ -102,14 +106,11 @@ def made_of(recording: Recording, mapping: ImportMapping, path: Path, isometric_
         calcium_time_s=calcium.time_s,
         calcium_um=calcium.calcium_um,
         force_time_s=settle(force.time_s),
-        force_n=settle(force.force_n),
+        force_n=settle(force_n),
     )
     trial = _with_shown_facts(draft, trial, path, {"amplitude_l0": amplitude_l0, "recovery_s": recovery_s})
     for line in unrecorded(trial):
         draft.warn(line)
-    if mapping.notch_hz:
-        with naming(draft.where):
-            trial = notched(trial, mapping.notch_hz)
     if line := hum_line(trial, mapping.notch_hz):
         draft.warn(line)
     return replace(trial, warnings=tuple(draft.warnings))

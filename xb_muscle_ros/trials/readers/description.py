@@ -146,8 +146,9 @@ class ImportMapping:
 
     @property
     def l0_is_a_length(self) -> bool:
-        """Whether L0 is so many metres, rather than what a record in L0 counts in."""
-        return self.length.unit.kind == "length" or self.reference_length is not None
+        """Whether L0 is so many metres, rather than what a record in L0 counts in: bags hold 1 m for that."""
+        told_m = None if self.reference_length is None else self.reference_length.value
+        return self.length.unit.kind == "length" or told_m not in (None, 1.0)
 
     @property
     def columns(self) -> dict[str, Column]:

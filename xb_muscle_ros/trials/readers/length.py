@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from xb_muscle_ros.errors import UserError
+from xb_muscle_ros.errors import UserError, naming
 from xb_muscle_ros.trials.checks import LENGTH_CHANGE_L0
-from xb_muscle_ros.trials.phases import detect_phases, initial_isometric
+from xb_muscle_ros.trials.mains import Notch
+from xb_muscle_ros.trials.phases import detect_phases, initial_isometric, moves
 from xb_muscle_ros.trials.readers.base import Draft
 from xb_muscle_ros.trials.readers.description import ImportMapping
 from xb_muscle_ros.trials.readers.plausibility import (
@@ -35,11 +36,15 @@ class Length(NamedTuple):
     phases: tuple[Phase, ...]
 
 
-def read_length(draft: Draft, time_s: Array) -> Length:
+def read_length(draft: Draft, time_s: Array, notch: Notch) -> Length:
     """Make lengths of the length column; amplitude and recovery, where they are known, help to find phases.
 
+    Args:
+        time_s: shape (n,), s.
+        notch: frequencies that are taken out of length before L0 and phases are found in it.
+
     Raises:
-        UserError: a length that no muscle has.
+        UserError: a length that no muscle has, or that the notch cannot be made in.
     """
     mapping, signal, facts = draft.mapping, draft.recording.signals["length"], draft.recording.facts
     reference_m = None if mapping.reference_length is None else mapping.reference_length.value
@@ -50,23 +55,39 @@ def read_length(draft: Draft, time_s: Array) -> Length:
     if reference_m is not None and (mapping.length_is_change or mapping.at_reference is not None):
         at_m = 0.0 if mapping.at_reference is None else mapping.at_reference.value * unit_m
         length_m = length_m - at_m + reference_m
+    recorded_m = length_m
+    with naming(draft.where):
+        length_m = notch.without("length", time_s, recorded_m)
     give = 0.0 if mapping.servo_give is None else mapping.servo_give.value * unit_m
     phases = detect_phases(time_s, length_m, facts.get("amplitude_l0"), facts.get("recovery_s"), reference_m, give)
     how = mapping.reference_note
     if reference_m is None:
-        how = "mean before the first change of length"
-        isometric = length_m[initial_isometric(time_s, phases)]
-        if isometric.size == 0:
-            draft.warnings.append(f"{draft.where} does not begin isometrically; L0 is the length of its first sample")
-            isometric = length_m[:1]
-        reference_m = float(np.mean(isometric))
-    _check(draft, length_m, reference_m)
+        reference_m, how = _first_isometric(draft, time_s, length_m, phases)
+    _check(draft, recorded_m, reference_m)
     draft.notes.append(_note(mapping, f"{reference_m:.6g} m ({how})"))
     warn_of_length(draft, length_m, reference_m)
-    warn_of_spikes(draft, signal, length_m / reference_m, SPIKE_L0, "L0")
+    warn_of_spikes(draft, signal, recorded_m / reference_m, SPIKE_L0, "L0")
     if mapping.length_of != "fibre":
         length_m, reference_m = length_m / reference_m, 1.0
     return Length(length_m, reference_m, phases)
+
+
+def _first_isometric(draft: Draft, time_s: Array, length_m: Array, phases: tuple[Phase, ...]) -> tuple[float, str]:
+    """L0 (m) of the length before its first change, and how it was found; other lengths get a line."""
+    isometric = length_m[initial_isometric(time_s, phases)]
+    if isometric.size == 0:
+        draft.warnings.append(f"{draft.where} does not begin isometrically; L0 is the length of its first sample")
+        return float(length_m[0]), "the first sample, as length moves from there on"
+    level = float(np.mean(isometric))
+    if len(phases) > 1:
+        return level, "mean before the first change of length"
+    if not moves(length_m):
+        return level, "mean of the record, in which no change of length is found"
+    draft.warn(
+        "length moves, but noise, hum or an oscillation hides its first change, so L0 is the mean of the whole "
+        f"record, {level:.6g} m; give it with --reference-length, or take hum out with --notch"
+    )
+    return level, "mean of the whole record, as noise, hum or an oscillation hides the first change of length"
 
 
 def _check(draft: Draft, length_m: Array, reference_m: float) -> None:
