@@ -77,6 +77,17 @@ def test_hum_beside_a_notch_is_told() -> None:
     assert "hum of 60.0 Hz with an amplitude of 2 % F0; --notch 50 60 of import takes it out" in left
 
 
+@pytest.mark.parametrize(("noise", "amplitude"), [(0.0, 1e-3), (5e-5, 1e-3), (2e-4, 4e-4)])
+def test_an_oscillation_of_length_beside_that_of_force_is_told(noise: float, amplitude: float) -> None:
+    trial = recorded(50.0, 0.01)
+    wave = amplitude * np.sin(2.0 * np.pi * 50.0 * trial.time_s + 0.2)
+    still = trial.length_m + noise * np.random.default_rng(3).normal(size=trial.time_s.size)
+    line = hum_line(replace(trial, length_m=still + wave))
+    assert f"and length has {100.0 * amplitude:.2g} % L0 at this frequency; --notch 50 of import takes out both" in line
+    assert "wrong for an oscillation of length that was meant" in line
+    assert "and length has" not in hum_line(replace(trial, length_m=still))
+
+
 def test_a_short_record_is_not_offered_what_it_cannot_take() -> None:
     trial = xb.StretchShortenStretch(0.0383, 0.1, lead_s=0.4, hold_s=0.3).trial("soleus", 6.1, 1000.0)
     force = 0.5 + 0.02 * np.sin(2.0 * np.pi * 50.0 * trial.time_s)

@@ -18,6 +18,9 @@ MAINS_HZ = (50.0, 60.0)
 _NEAR_HZ = 1.0
 # Hum with an amplitude below this is within what any recording has, F0.
 LEAST_F0 = 1e-3
+# A line in length is told from this amplitude on, L0, where it is so many times that of frequencies beside it, in units
+# of the record's resolution.
+_LEAST_L0, _STANDS_OUT, _BESIDE = 1e-5, 4.0, (-4.0, -3.0, -2.0, 2.0, 3.0, 4.0)
 # Of a longer part the last so many samples are looked at.
 _MOST, _LEAST = 4000, 60
 # Width of a notch between the frequencies that lose half of their power in one pass, Hz: the mains wander by 0.1 Hz.
@@ -55,7 +58,7 @@ def hum_of_mains(time_s: Array, force_f0: Array, without_hz: Sequence[float] = (
 
 
 def hum_line(trial: Trial, without_hz: Sequence[float] = ()) -> str:
-    """One line on the hum in a trial's force before its first change of length; empty where there is none.
+    """One line on the hum in a trial's force, and in its length, before length changes; empty where force has none.
 
     Args:
         without_hz: notches that were made already.
@@ -75,7 +78,27 @@ def hum_line(trial: Trial, without_hz: Sequence[float] = ()) -> str:
     if fault:
         return f"{line}; {fault}, so --notch of import cannot take it out"
     notches = " ".join(f"{round(hz, 1):g}" for hz in (*without_hz, found[0]))
-    return f"{line}; --notch {notches} of import takes it out of length and force"
+    length_l0 = _line_of_length(trial, found[0])
+    if not length_l0:
+        return f"{line}; --notch {notches} of import takes it out of length and force"
+    return (
+        f"{line}, and length has {100.0 * length_l0:.2g} % L0 at this frequency; --notch {notches} of import takes out "
+        "both: right for hum of both, wrong for an oscillation of length that was meant"
+    )
+
+
+def _line_of_length(trial: Trial, hz: float) -> float:
+    """Amplitude (L0) of a line in length at a frequency before the first change; 0 where there is none."""
+    isometric = initial_isometric(trial.time_s, trial.facts.phases)
+    inside = slice(max(isometric.stop - _MOST, 0), isometric.stop)
+    time_s, length = trial.time_s[inside], trial.length_change_l0[inside]
+    if time_s.size < _LEAST or np.ptp(length) == 0.0:
+        return 0.0
+    amplitude = float(np.sqrt(2.0 * np.mean(sine_in(time_s, length, hz) ** 2)))
+    span_s = float(time_s[-1] - time_s[0])
+    beside = [hz + k / span_s for k in _BESIDE]
+    level = float(np.sqrt(2.0 * np.mean([np.mean(sine_in(time_s, length, each) ** 2) for each in beside])))
+    return amplitude if amplitude >= max(_LEAST_L0, _STANDS_OUT * level) else 0.0
 
 
 class Notch(NamedTuple):
