@@ -78,7 +78,7 @@ _PER_VOLT = re.compile(
 # A number and its unit, with a blank between them or without.
 _NUMBER_AND_UNIT = re.compile(
     r"\s*(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
-    r"(?:\s+(?P<apart>(?:[^\W\d_]|%).*?)|(?![eE][+-]?\d)(?P<joined>[^\W\d_]\S*|%\S*))\s*"
+    r"(?:\s+(?P<apart>\S+|(?:[^\W\d_]|%).*?)|(?![eE][+-]?\d)(?P<joined>[^\W\d_]\S*|%\S*))\s*"
 )
 VOLTS = ("V", "mV")
 # A stress by its area: ``mN/mm^2``, ``N cm-2``, ``kN.m^-2``.
